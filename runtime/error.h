@@ -13,6 +13,8 @@ struct Error {
 template <class T>
 using Expected = tl::expected<T, Error>;
 
-inline tl::unexpected<Error> fail_with(std::string text) { return tl::unexpected<Error>{Error{std::move(text)}}; }
+inline tl::unexpected<Error> fail_with(std::string text) {
+  return tl::unexpected<Error>{Error{std::move(text)}};
+}
 
 }  // namespace airworthy::rt

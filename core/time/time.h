@@ -5,8 +5,8 @@
 
 namespace airworthy {
 
-/// Vehicle time: µs of CLOCK_BOOTTIME on the gateway's computer. Core code never reads it from a clock; it comes
-/// as an argument, taken from a message.
+/// Vehicle time: µs of CLOCK_BOOTTIME on the gateway's computer. Core code never reads it from a clock; it
+/// comes as an argument, taken from a message.
 struct VehicleTime {
   using rep = std::int64_t;
   using period = std::micro;

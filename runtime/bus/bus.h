@@ -10,9 +10,9 @@
 
 namespace airworthy::rt {
 
-/// Publish-subscribe transport of encoded messages. Three implementations: LcmBus (udpm:// and memq://) and LogBus (a
-/// recording). Handlers run on the thread that dispatches; they may publish and subscribe, and must not throw,
-/// because LCM calls them from C.
+/// Publish-subscribe transport of encoded messages. Three implementations: LcmBus (udpm:// and memq://) and
+/// LogBus (a recording). Handlers run on the thread that dispatches; they may publish and subscribe, and must
+/// not throw, because LCM calls them from C.
 class Bus {
  public:
   using Handler = std::function<void(std::span<const std::uint8_t> payload)>;

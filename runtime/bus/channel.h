@@ -10,7 +10,7 @@ enum class Role { kInput, kDerived, kTruth };
 
 /// A row of lcmtypes/channels.toml.
 struct ChannelInfo {
-  std::string_view name;      ///< without the vehicle prefix
+  std::string_view name;  ///< without the vehicle prefix
   Role role;
   std::string_view producer;  ///< process name, or "driver", "detector", "any", "import"
   double nominal_Hz;          ///< 0 = as received or on change

@@ -8,8 +8,9 @@
 
 namespace airworthy::rt {
 
-/// CLOCK_BOOTTIME, times `scale` in a demonstration or test that runs faster than life: every process of the system
-/// must then be started with the same scale, and all agree without talking because the origin is the boot.
+/// CLOCK_BOOTTIME, times `scale` in a demonstration or test that runs faster than life: every process of the
+/// system must then be started with the same scale, and all agree without talking because the origin is the
+/// boot.
 class LiveClock final : public Clock {
  public:
   LiveClock(boost::asio::io_context& io, double scale) : io_{io}, scale_{scale} {}

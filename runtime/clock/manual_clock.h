@@ -6,7 +6,8 @@
 
 namespace airworthy::rt {
 
-/// A clock that stands still until moved: by a test, by the message times of a recording, or by TICK messages.
+/// A clock that stands still until moved: by a test, by the message times of a recording, or by TICK
+/// messages.
 class ManualClock final : public Clock {
  public:
   explicit ManualClock(TimePoint start = TimePoint{}) : now_{start} {}
@@ -14,8 +15,8 @@ class ManualClock final : public Clock {
   [[nodiscard]] TimePoint now() const override { return now_; }
   void every(Duration period, Callback callback) override;
 
-  /// Moves forward and fires every timer due on the way, in order of time; a step back is ignored. The first move
-  /// from zero sets the time without firing, so that a recording may start at any time.
+  /// Moves forward and fires every timer due on the way, in order of time; a step back is ignored. The first
+  /// move from zero sets the time without firing, so that a recording may start at any time.
   void advance_to(TimePoint t);
 
  private:
