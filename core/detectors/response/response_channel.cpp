@@ -1,0 +1,81 @@
+#include "core/detectors/response/response_channel.h"
+
+namespace airworthy::response {
+
+using Transition = FaultLifeCycle::Transition;
+
+ResponseChannel::ResponseChannel(const ChannelParams& params) noexcept
+    : params_{params},
+      response_{params.response},
+      regression_{params.regression},
+      low_{params.cusum},
+      high_{params.cusum},
+      life_cycle_{params.life_cycle} {
+  for (std::size_t i = 0; i < regressors_.size(); ++i) regressors_[i] = Regressor{params.terms[i]};
+}
+
+ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, TimePoint now, Duration flown,
+                                     bool muted) noexcept {
+  ChannelVerdict verdict;
+  verdict.observed = response_.step(frame, tick_s);
+  auto x = decltype(regression_)::Vector{params_.term_count};
+  for (int i = 0; i < params_.term_count; ++i) {
+    x(i) = regressors_[static_cast<std::size_t>(i)].step(frame, tick_s);
+  }
+
+  decltype(regression_)::Prediction prediction;
+  const bool frozen = muted || life_cycle_.active();  // what a fault does must not become what is expected
+  const UpdateStatus status = frozen ? regression_.predict(x, verdict.observed, prediction)
+                                     : regression_.update(x, verdict.observed, prediction);
+  if (status == UpdateStatus::kNotFinite) {
+    verdict.reason = NotJudged::kInputUnknown;
+    verdict.test_ratio = std::max(low_.test_ratio(), high_.test_ratio());
+    return verdict;
+  }
+  verdict.expected = prediction.expected;
+  verdict.sigma = prediction.sigma;
+  if (status == UpdateStatus::kConverging || flown < params_.warm_up) return verdict;
+  verdict.reason = NotJudged::kJudged;
+  if (!muted) accumulate(prediction.innovation / prediction.sigma, now);
+
+  const Cusum& worse = low_.test_ratio() >= high_.test_ratio() ? low_ : high_;
+  verdict.test_ratio = worse.test_ratio();
+  verdict.transition = life_cycle_.step(verdict.test_ratio, now);
+  if (verdict.transition == Transition::kRaise) {
+    onset_ = worse.onset();
+    innovation_sum_ = variance_sum_ = 0;
+    innovation_count_ = 0;
+  }
+  if (life_cycle_.active()) track_magnitude(verdict);
+  if (verdict.transition == Transition::kClear) {
+    low_.reset();
+    high_.reset();
+    regression_.drop_unlearned();
+  }
+  verdict.onset = onset_;
+  if (innovation_count_ > 0) {
+    const auto count = static_cast<double>(innovation_count_);
+    verdict.mean_innovation = innovation_sum_ / count;
+    verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
+  }
+  return verdict;
+}
+
+void ResponseChannel::restart_history() noexcept {
+  response_.reset_history();
+  for (Regressor& regressor : regressors_) regressor.reset_history();
+  regression_.drop_unlearned();
+}
+
+void ResponseChannel::accumulate(double z, TimePoint now) noexcept {
+  if (params_.side != Side::kHigh) low_.step(-z, now);
+  if (params_.side != Side::kLow) high_.step(z, now);
+}
+
+void ResponseChannel::track_magnitude(const ChannelVerdict& verdict) noexcept {
+  innovation_sum_ += verdict.observed - verdict.expected;
+  variance_sum_ += verdict.sigma * verdict.sigma;
+  ++innovation_count_;
+}
+
+}  // namespace airworthy::response

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+
+#include "core/detectors/cusum.h"
+#include "core/detectors/fault_life_cycle.h"
+#include "core/detectors/response/regressor.h"
+#include "core/estimators/delayed_regression.h"
+
+namespace airworthy::response {
+
+inline constexpr int kMostTerms = 12;
+inline constexpr int kMostLearningDelayTicks = 128;
+
+/// Which deviation of the response is a fault.
+enum class Side : std::uint8_t { kLow, kHigh, kBoth };
+
+struct ChannelParams {
+  Term response;
+  int term_count = 0;
+  std::array<Term, kMostTerms> terms{};
+  Side side = Side::kBoth;
+  DelayedRegressionParams regression;
+  CusumParams cusum;
+  FaultLifeCycleParams life_cycle;
+  Duration warm_up{20'000'000};  ///< no verdict before so much flight has been seen
+};
+
+/// Why a channel gives no verdict at a tick.
+enum class NotJudged : std::uint8_t { kJudged, kConverging, kInputUnknown };
+
+/// The verdict of one tick with all that a reader needs to recompute it.
+struct ChannelVerdict {
+  NotJudged reason = NotJudged::kConverging;
+  double observed = 0;
+  double expected = 0;
+  double sigma = 0;       ///< of observed − expected, predicted
+  double test_ratio = 0;  ///< alarm at 1
+  FaultLifeCycle::Transition transition = FaultLifeCycle::Transition::kNone;
+  TimePoint onset;             ///< of the active fault
+  double mean_innovation = 0;  ///< since the onset, while a fault is active
+  double mean_innovation_sigma = 0;
+};
+
+/// Expects one measured response from commands and state, and accumulates evidence that it no longer comes.
+///   Operating point: docs/detection_matrix.md, rows "response".
+class ResponseChannel {
+ public:
+  explicit ResponseChannel(const ChannelParams& params) noexcept;
+
+  /// One tick. `flown` is the flight time seen so far. With `muted` nothing is learned and no evidence is
+  /// gathered.
+  ChannelVerdict step(const SignalFrame& frame, double tick_s, TimePoint now, Duration flown,
+                      bool muted) noexcept;
+
+  /// After a gap in the input: delays and unlearned samples are dropped, what was learned stays.
+  void restart_history() noexcept;
+
+  [[nodiscard]] bool fault_active() const noexcept { return life_cycle_.active(); }
+
+ private:
+  void accumulate(double z, TimePoint now) noexcept;
+  void track_magnitude(const ChannelVerdict& verdict) noexcept;
+
+  ChannelParams params_;
+  Regressor response_;
+  std::array<Regressor, kMostTerms> regressors_;
+  DelayedRegression<double, kMostTerms, kMostLearningDelayTicks> regression_;
+  Cusum low_;
+  Cusum high_;
+  FaultLifeCycle life_cycle_;
+  TimePoint onset_;
+  double innovation_sum_ = 0;
+  double variance_sum_ = 0;
+  std::int64_t innovation_count_ = 0;
+};
+
+}  // namespace airworthy::response

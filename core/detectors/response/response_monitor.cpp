@@ -1,0 +1,154 @@
+#include "core/detectors/response/response_monitor.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace airworthy::response {
+namespace {
+
+template <std::size_t... kIndex>
+std::array<ResponseChannel, sizeof...(kIndex)> make_channels(
+    const std::array<ChannelParams, sizeof...(kIndex)>& params, std::index_sequence<kIndex...> /*unused*/) {
+  return {ResponseChannel{params[kIndex]}...};
+}
+
+bool all_finite(const std::array<double, 3>& v) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
+}  // namespace
+
+ResponseMonitor::ResponseMonitor(const MonitorParams& params) noexcept
+    : params_{params}, channels_{make_channels(params.channels, std::make_index_sequence<kMostChannels>{})} {}
+
+bool ResponseMonitor::on_imu(const ImuSample& sample) noexcept {
+  if (!all_finite(sample.accel_m_s2) || !all_finite(sample.gyro_rad_s) ||
+      (started_ && sample.time <= last_sample_)) {
+    ++refused_samples_;
+    return false;
+  }
+  silent_ = false;
+  if (!started_ || sample.time - last_sample_ > params_.longest_gap) {
+    restart(sample.time);
+    return false;
+  }
+  const Duration interval = sample.time - last_sample_;
+  last_sample_ = sample.time;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    accel_sum_[axis] += sample.accel_m_s2[axis];
+    gyro_sum_[axis] += sample.gyro_rad_s[axis];
+  }
+  ++averaged_;
+  // The sample nearest to the end of the period completes it, whatever the rate of the inertial unit.
+  if (sample.time + interval / 2 < tick_time_ + params_.tick_period) return false;
+  finish_tick(sample.time);
+  return true;
+}
+
+void ResponseMonitor::on_attitude(TimePoint time, double roll_rad, double pitch_rad) noexcept {
+  if (!std::isfinite(roll_rad) || !std::isfinite(pitch_rad) ||
+      (attitude_.valid() && time <= attitude_.measured_at())) {
+    ++refused_samples_;
+    return;
+  }
+  attitude_.measure(time, roll_rad, pitch_rad);
+}
+
+void ResponseMonitor::on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad) noexcept {
+  if (!std::isfinite(roll_rad) || !std::isfinite(pitch_rad) || (setpoint_.known && time < setpoint_.time)) {
+    ++refused_samples_;
+    return;
+  }
+  setpoint_ = {time, roll_rad, pitch_rad, true};
+}
+
+void ResponseMonitor::on_flight_state(const FlightState& state) noexcept {
+  if (flight_state_known_ && state.time < flight_state_.time) {
+    ++refused_samples_;
+    return;
+  }
+  flight_state_ = state;
+  flight_state_known_ = true;
+}
+
+void ResponseMonitor::on_clock(TimePoint now) noexcept {
+  silent_ = started_ && now - last_sample_ > params_.longest_gap;
+}
+
+MonitorState ResponseMonitor::state() const noexcept {
+  if (!started_) return MonitorState::kInitialising;
+  if (muted() != Muted::kNo) return MonitorState::kMuted;
+  const auto verdicts_now = verdicts();
+  const bool judging =
+      std::any_of(verdicts_now.begin(), verdicts_now.end(),
+                  [](const ChannelVerdict& verdict) { return verdict.reason == NotJudged::kJudged; });
+  return judging ? MonitorState::kMonitoring : MonitorState::kConverging;
+}
+
+void ResponseMonitor::restart(TimePoint now) noexcept {
+  if (started_) ++gaps_;
+  started_ = true;
+  last_sample_ = tick_time_ = now;
+  averaged_ = 0;
+  accel_sum_ = gyro_sum_ = {};
+  for (ResponseChannel& channel : channels_) channel.restart_history();
+}
+
+void ResponseMonitor::finish_tick(TimePoint now) noexcept {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    accel_[axis] = accel_sum_[axis] / averaged_;
+    gyro_[axis] = gyro_sum_[axis] / averaged_;
+  }
+  averaged_ = 0;
+  accel_sum_ = gyro_sum_ = {};
+  const Duration elapsed = now - tick_time_;
+  tick_time_ = now;
+  attitude_.step(now, to_seconds(elapsed), gyro_[0], gyro_[1], gyro_[2]);
+
+  muted_ = flying() ? Muted::kNo : Muted::kNotFlying;
+  if (muted_ == Muted::kNo) flown_ += elapsed;
+  const SignalFrame signals = frame(now);
+  for (int i = 0; i < params_.channel_count; ++i) {
+    const auto channel = static_cast<std::size_t>(i);
+    verdicts_[channel] =
+        channels_[channel].step(signals, to_seconds(elapsed), now, flown_, muted_ != Muted::kNo);
+  }
+}
+
+SignalFrame ResponseMonitor::frame(TimePoint now) const noexcept {
+  SignalFrame signals;
+  signals[Signal::kAccelX] = accel_[0];
+  signals[Signal::kAccelY] = accel_[1];
+  signals[Signal::kAccelZ] = accel_[2];
+  signals[Signal::kRollRate] = gyro_[0];
+  signals[Signal::kPitchRate] = gyro_[1];
+  signals[Signal::kYawRate] = gyro_[2];
+  if (attitude_.valid() && now - attitude_.measured_at() <= params_.input_timeout) {
+    const double roll = attitude_.roll_rad();
+    signals[Signal::kRoll] = roll;
+    signals[Signal::kPitch] = attitude_.pitch_rad();
+    signals[Signal::kEulerPitchRate] = gyro_[1] * std::cos(roll) - gyro_[2] * std::sin(roll);
+  }
+  if (setpoint_.known && now - setpoint_.time <= params_.input_timeout) {
+    signals[Signal::kRollSetpoint] = setpoint_.roll_rad;
+    signals[Signal::kPitchSetpoint] = setpoint_.pitch_rad;
+    signals[Signal::kRollError] = setpoint_.roll_rad - signals[Signal::kRoll];
+    signals[Signal::kPitchError] = setpoint_.pitch_rad - signals[Signal::kPitch];
+  }
+  if (flight_state_known_ && now - flight_state_.time <= params_.input_timeout) {
+    signals[Signal::kAltitudeError] = flight_state_.altitude_error_m;
+    signals[Signal::kAirspeedError] = flight_state_.airspeed_error_m_s;
+    signals[Signal::kAirspeed] = flight_state_.airspeed_m_s;
+    signals[Signal::kClimb] = flight_state_.climb_m_s;
+  }
+  return signals;
+}
+
+bool ResponseMonitor::flying() const noexcept {
+  if (!flight_state_known_) return true;
+  if (flight_state_.armed == 0 || flight_state_.landed_state == 1) return false;
+  // A comparison with NaN is false: an unknown ground speed does not say that the vehicle stands.
+  return !(flight_state_.groundspeed_m_s < params_.min_groundspeed_m_s);
+}
+
+}  // namespace airworthy::response

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "core/detectors/response/response_channel.h"
+#include "core/estimators/attitude_propagator.h"
+
+namespace airworthy::response {
+
+inline constexpr int kMostChannels = 8;
+
+struct MonitorParams {
+  Duration tick_period{100'000};      ///< the inertial samples of a period are averaged into one tick
+  Duration longest_gap{1'000'000};    ///< a longer silence of the inertial unit restarts all delays
+  Duration input_timeout{2'000'000};  ///< attitude, set-point and flight state older than this are unknown
+  double min_groundspeed_m_s = 0;     ///< slower is not flying; 0 = not asked
+  int channel_count = 0;
+  std::array<ChannelParams, kMostChannels> channels{};
+};
+
+enum class MonitorState : std::uint8_t { kInitialising = 0, kConverging = 1, kMonitoring = 2, kMuted = 3 };
+enum class Muted : std::uint8_t { kNo, kNotFlying, kInputStale };
+
+struct ImuSample {
+  TimePoint time;
+  std::array<double, 3> accel_m_s2{};
+  std::array<double, 3> gyro_rad_s{};
+};
+
+/// NaN where not known.
+struct FlightState {
+  TimePoint time;
+  double airspeed_m_s;
+  double groundspeed_m_s;
+  double climb_m_s;
+  double altitude_error_m;
+  double airspeed_error_m_s;
+  int armed;         ///< 1, 0, -1 unknown
+  int landed_state;  ///< 1 = on ground, -1 unknown
+};
+
+/// All response channels of a vehicle on one stream of samples. Times come from the messages alone, so that
+/// the same stream gives the same verdicts, live or replayed. Inputs may come in any mix of rates; the
+/// inertial samples set the pace. Every sample must be finite and newer than the last of its kind; others are
+/// refused and change nothing.
+class ResponseMonitor {
+ public:
+  explicit ResponseMonitor(const MonitorParams& params) noexcept;
+
+  /// True if the sample completed a tick: verdicts() are then new.
+  [[nodiscard]] bool on_imu(const ImuSample& sample) noexcept;
+  void on_attitude(TimePoint time, double roll_rad, double pitch_rad) noexcept;
+  void on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad) noexcept;
+  void on_flight_state(const FlightState& state) noexcept;
+
+  /// Judges silence, on the gateway's clock: with no inertial sample for `longest_gap` the monitor is muted.
+  /// Evidence is not touched, so the verdicts never depend on how ticks and samples interleave.
+  void on_clock(TimePoint now) noexcept;
+
+  [[nodiscard]] MonitorState state() const noexcept;
+  [[nodiscard]] Muted muted() const noexcept { return silent_ ? Muted::kInputStale : muted_; }
+  [[nodiscard]] TimePoint tick_time() const noexcept { return tick_time_; }
+  [[nodiscard]] std::span<const ChannelVerdict> verdicts() const noexcept {
+    return {verdicts_.data(), static_cast<std::size_t>(params_.channel_count)};
+  }
+  [[nodiscard]] std::int64_t refused_samples() const noexcept { return refused_samples_; }
+  [[nodiscard]] std::int64_t gaps() const noexcept { return gaps_; }
+
+ private:
+  struct Setpoint {
+    TimePoint time;
+    double roll_rad;
+    double pitch_rad;
+    bool known = false;
+  };
+
+  void restart(TimePoint now) noexcept;
+  void finish_tick(TimePoint now) noexcept;
+  [[nodiscard]] SignalFrame frame(TimePoint now) const noexcept;
+  [[nodiscard]] bool flying() const noexcept;
+
+  MonitorParams params_;
+  // optional<ResponseChannel> would do; default parameters make unused channels cheap instead.
+  std::array<ResponseChannel, kMostChannels> channels_;
+  std::array<ChannelVerdict, kMostChannels> verdicts_{};
+  AttitudePropagator<double> attitude_;
+  Setpoint setpoint_{};
+  FlightState flight_state_{};
+  bool flight_state_known_ = false;
+
+  bool started_ = false;
+  TimePoint last_sample_;
+  TimePoint tick_time_;
+  int averaged_ = 0;
+  std::array<double, 3> accel_sum_{};
+  std::array<double, 3> gyro_sum_{};
+  std::array<double, 3> accel_{};
+  std::array<double, 3> gyro_{};
+  Duration flown_{0};
+  Muted muted_ = Muted::kNo;
+  bool silent_ = false;
+  std::int64_t refused_samples_ = 0;
+  std::int64_t gaps_ = 0;
+};
+
+}  // namespace airworthy::response

@@ -1,0 +1,291 @@
+#include "core/detectors/response/response_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "tests/support/allocation_guard.h"
+
+namespace airworthy::response {
+namespace {
+
+using Transition = FaultLifeCycle::Transition;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+MonitorParams thrust_only() {
+  MonitorParams params;
+  params.min_groundspeed_m_s = 5.0;
+  params.channel_count = 1;
+  ChannelParams& channel = params.channels[0];
+  channel.response.signal = Signal::kAccelX;
+  channel.terms[0].signal = Signal::kPitchSetpoint;
+  channel.terms[1].signal = Signal::kPitch;
+  channel.terms[2].signal = Signal::kAirspeedError;
+  channel.terms[3].signal = Signal::kOne;
+  channel.term_count = 4;
+  channel.regression.terms = 4;
+  channel.side = Side::kLow;
+  return params;
+}
+
+/// A straight flight whose forward acceleration is a known function of attitude, command and speed error,
+/// plus noise.
+class Flight {
+ public:
+  explicit Flight(unsigned seed, double imu_rate_Hz = 10.0) : random_{seed}, imu_rate_Hz_{imu_rate_Hz} {}
+
+  double fault_at_s = std::numeric_limits<double>::infinity();
+  double heals_at_s = std::numeric_limits<double>::infinity();
+  double lost_accel_m_s2 = 1.5;
+  double groundspeed_m_s = 20.0;
+  TimePoint start = from_us(77'000'000);
+  std::function<void(ResponseMonitor&, double)> before_sample;  ///< something hostile
+
+  struct Found {
+    double at_s;
+    double onset_s;
+    Transition transition;
+  };
+
+  std::vector<Found> fly(ResponseMonitor& monitor, double duration_s) {
+    std::vector<Found> found;
+    const int samples = static_cast<int>(duration_s * imu_rate_Hz_);
+    for (int i = 0; i < samples; ++i) {
+      const double t = i / imu_rate_Hz_;
+      const TimePoint time = start + from_seconds(t);
+      const double setpoint = 0.1 * std::sin(0.3 * t);
+      const double pitch = 0.1 * std::sin(0.3 * t - 0.4);
+      const double speed_error = std::sin(0.05 * t);
+      const int slow_every = static_cast<int>(imu_rate_Hz_ / 5);
+      if (i % slow_every == 0) {
+        monitor.on_attitude(time, 0.0, pitch);
+        monitor.on_attitude_setpoint(time, 0.0, setpoint);
+        monitor.on_flight_state({time, 20.0, groundspeed_m_s, 0.0, 0.0, speed_error, 1, -1});
+      }
+      if (before_sample) before_sample(monitor, t);
+      const bool failed = t >= fault_at_s && t < heals_at_s;
+      // The noise of one sample grows with the rate, so that a tick's average is equally noisy at every rate.
+      const double noise = 0.25 * std::sqrt(imu_rate_Hz_ / 10.0) * normal_(random_);
+      const double accel =
+          0.5 + 4.0 * setpoint + 5.0 * pitch + 0.3 * speed_error + noise - (failed ? lost_accel_m_s2 : 0.0);
+      const double pitch_rate = 0.03 * std::cos(0.3 * t - 0.4);
+      if (!monitor.on_imu({time, {accel, 0.0, -9.81}, {0.0, pitch_rate, 0.0}})) continue;
+      const ChannelVerdict& verdict = monitor.verdicts()[0];
+      if (verdict.transition == Transition::kRaise || verdict.transition == Transition::kClear) {
+        found.push_back({t, to_seconds(verdict.onset - start), verdict.transition});
+      }
+    }
+    return found;
+  }
+
+ private:
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_;
+  double imu_rate_Hz_;
+};
+
+TEST(ResponseMonitor, FindsAThrustLossWithinTwoSeconds) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    ResponseMonitor monitor{thrust_only()};
+    Flight flight{seed};
+    flight.fault_at_s = 60.0;
+    const auto found = flight.fly(monitor, 70.0);
+    ASSERT_EQ(found.size(), 1U) << "seed " << seed;
+    EXPECT_GE(found[0].at_s, 60.0);
+    EXPECT_LE(found[0].at_s, 62.0) << "seed " << seed;
+    EXPECT_NEAR(found[0].onset_s, 60.0, 0.6) << "seed " << seed;
+    EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+  }
+}
+
+TEST(ResponseMonitor, SilentInAnHourOfHealthyFlight) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    ResponseMonitor monitor{thrust_only()};
+    EXPECT_TRUE(Flight{seed}.fly(monitor, 600.0).empty()) << "seed " << seed;
+    EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+  }
+}
+
+TEST(ResponseMonitor, MoreThrustIsNotAThrustLoss) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{1};
+  flight.fault_at_s = 60.0;
+  flight.lost_accel_m_s2 = -3.0;
+  EXPECT_TRUE(flight.fly(monitor, 61.8).empty());
+}
+
+TEST(ResponseMonitor, ClearsWhenTheThrustComesBack) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{3};
+  flight.fault_at_s = 60.0;
+  flight.heals_at_s = 75.0;
+  const auto found = flight.fly(monitor, 120.0);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[1].transition, Transition::kClear);
+  EXPECT_GT(found[1].at_s, 80.0);
+  EXPECT_LT(found[1].at_s, 90.0);
+}
+
+TEST(ResponseMonitor, ALastingFaultIsNeverLearned) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{3};
+  flight.fault_at_s = 60.0;
+  const auto found = flight.fly(monitor, 600.0);
+  ASSERT_EQ(found.size(), 1U) << "raised once, never cleared";
+}
+
+TEST(ResponseMonitor, ALargerFaultIsNeverFoundLater) {
+  double last = std::numeric_limits<double>::infinity();
+  for (const double size : {0.8, 1.2, 2.0, 4.0, 8.0}) {
+    ResponseMonitor monitor{thrust_only()};
+    Flight flight{5};
+    flight.fault_at_s = 60.0;
+    flight.lost_accel_m_s2 = size;
+    const auto found = flight.fly(monitor, 90.0);
+    ASSERT_FALSE(found.empty()) << size;
+    EXPECT_LE(found[0].at_s, last);
+    last = found[0].at_s;
+  }
+}
+
+TEST(ResponseMonitor, TheRateOfTheInertialUnitDoesNotMatter) {
+  for (const double rate_Hz : {10.0, 50.0, 200.0, 500.0}) {
+    ResponseMonitor monitor{thrust_only()};
+    Flight flight{2, rate_Hz};
+    flight.fault_at_s = 60.0;
+    const auto found = flight.fly(monitor, 70.0);
+    ASSERT_EQ(found.size(), 1U) << rate_Hz;
+    EXPECT_LE(found[0].at_s, 62.0) << rate_Hz;
+  }
+}
+
+TEST(ResponseMonitor, ATimeShiftChangesNothing) {
+  std::vector<Flight::Found> reference;
+  for (const std::int64_t start_us : {77'000'000LL, 1'539'875'267'000'000LL}) {
+    ResponseMonitor monitor{thrust_only()};
+    Flight flight{9};
+    flight.start = from_us(start_us);
+    flight.fault_at_s = 50.0;
+    const auto found = flight.fly(monitor, 60.0);
+    ASSERT_EQ(found.size(), 1U);
+    if (reference.empty()) {
+      reference = found;
+    } else {
+      EXPECT_EQ(found[0].at_s, reference[0].at_s);
+      EXPECT_NEAR(found[0].onset_s, reference[0].onset_s, 1e-6);
+    }
+  }
+}
+
+// Everything hostile is refused, counted, and the verdict is the same as without it.
+TEST(ResponseMonitor, HostileSamplesChangeNothing) {
+  Flight clean{4};
+  clean.fault_at_s = 60.0;
+  ResponseMonitor reference{thrust_only()};
+  const auto expected = clean.fly(reference, 70.0);
+  ASSERT_EQ(expected.size(), 1U);
+
+  Flight hostile{4};
+  hostile.fault_at_s = 60.0;
+  hostile.before_sample = [&](ResponseMonitor& monitor, double t) {
+    const TimePoint now = hostile.start + from_seconds(t);
+    EXPECT_FALSE(monitor.on_imu({now, {kNan, 0, 0}, {0, 0, 0}}));
+    EXPECT_FALSE(monitor.on_imu({now, {0, 0, 0}, {0, HUGE_VAL, 0}}));
+    if (t > 0) {
+      EXPECT_FALSE(monitor.on_imu({now - Duration{100'000}, {9, 9, 9}, {9, 9, 9}}));
+    }
+    monitor.on_attitude(now, kNan, 0.0);
+    monitor.on_attitude(now - Duration{1'000'000}, 1.0, 1.0);
+    monitor.on_attitude_setpoint(now, 0.0, kNan);
+    monitor.on_attitude_setpoint(now - Duration{1'000'000}, 1.0, 1.0);
+    monitor.on_flight_state({now - Duration{1'000'000}, 0, 0, 0, 99, 99, 0, 1});
+  };
+  ResponseMonitor monitor{thrust_only()};
+  const auto found = hostile.fly(monitor, 70.0);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].at_s, expected[0].at_s);
+  EXPECT_EQ(found[0].onset_s, expected[0].onset_s);
+  EXPECT_GT(monitor.refused_samples(), 700 * 7);
+}
+
+TEST(ResponseMonitor, TicksOfTheClockNeverTouchTheEvidence) {
+  Flight clean{4};
+  clean.fault_at_s = 60.0;
+  ResponseMonitor reference{thrust_only()};
+  const auto expected = clean.fly(reference, 70.0);
+  Flight ticking{4};
+  ticking.fault_at_s = 60.0;
+  ticking.before_sample = [&](ResponseMonitor& monitor, double t) {
+    monitor.on_clock(ticking.start + from_seconds(t) + Duration{5'000'000});  // even absurdly late ones
+  };
+  ResponseMonitor monitor{thrust_only()};
+  const auto found = ticking.fly(monitor, 70.0);
+  ASSERT_EQ(found.size(), expected.size());
+  EXPECT_EQ(found[0].at_s, expected[0].at_s);
+}
+
+TEST(ResponseMonitor, SilenceMutesAndHeals) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{6};
+  (void)flight.fly(monitor, 60.0);
+  monitor.on_clock(flight.start + from_seconds(60.5));
+  EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+  monitor.on_clock(flight.start + from_seconds(61.5));
+  EXPECT_EQ(monitor.state(), MonitorState::kMuted);
+  EXPECT_EQ(monitor.muted(), Muted::kInputStale);
+  Flight later{7};
+  later.start = flight.start + from_seconds(90.0);
+  EXPECT_TRUE(later.fly(monitor, 30.0).empty()) << "a gap is not a fault";
+  EXPECT_EQ(monitor.gaps(), 1);
+  EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+}
+
+TEST(ResponseMonitor, MutedWhileNotFlying) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{6};
+  flight.groundspeed_m_s = 1.0;
+  flight.fault_at_s = 60.0;
+  EXPECT_TRUE(flight.fly(monitor, 70.0).empty());
+  EXPECT_EQ(monitor.state(), MonitorState::kMuted);
+  EXPECT_EQ(monitor.muted(), Muted::kNotFlying);
+}
+
+TEST(ResponseMonitor, AnUnknownGroundspeedDoesNotMute) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{6};
+  flight.groundspeed_m_s = kNan;
+  flight.fault_at_s = 60.0;
+  EXPECT_EQ(flight.fly(monitor, 70.0).size(), 1U);
+}
+
+TEST(ResponseMonitor, MissingAttitudeIsNotJudged) {
+  ResponseMonitor monitor{thrust_only()};
+  std::mt19937 random{1};
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 600; ++i) {
+    (void)monitor.on_imu({from_us(1'000'000 + i * 100'000), {normal(random), 0, -9.81}, {0, 0, 0}});
+  }
+  EXPECT_EQ(monitor.verdicts()[0].reason, NotJudged::kInputUnknown);
+  EXPECT_EQ(monitor.state(), MonitorState::kConverging);
+}
+
+TEST(ResponseMonitor, UsesNoHeap) {
+  ResponseMonitor monitor{thrust_only()};
+  Flight flight{1};
+  (void)flight.fly(monitor, 40.0);
+  const TimePoint end = flight.start + from_seconds(40.0);
+  const test::AllocationGuard guard;
+  for (int i = 0; i < 100; ++i) {
+    (void)monitor.on_imu({end + Duration{i * 100'000}, {0.5, 0, -9.81}, {0, 0, 0}});
+  }
+  EXPECT_EQ(guard.allocations(), 0U);
+}
+
+}  // namespace
+}  // namespace airworthy::response
