@@ -1,0 +1,172 @@
+#include "services/response/response_config.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "runtime/config/vehicle.h"
+
+namespace airworthy::response {
+namespace {
+
+using rt::ConfigTable;
+using rt::Range;
+
+int delay_in_ticks(ConfigTable table, const char* key, double delay_s, double tick_s) {
+  const double ticks = delay_s / tick_s;
+  if (std::abs(ticks - std::round(ticks)) > 1e-6) {
+    table.fail(key, fmt::format("{} is not a multiple of input.tick_period_s ({})", delay_s, tick_s));
+  }
+  if (std::round(ticks) > Regressor::kMostDelayTicks) {
+    table.fail(key, fmt::format("{} is more than {} ticks", delay_s, Regressor::kMostDelayTicks));
+    return 0;
+  }
+  return static_cast<int>(std::round(ticks));
+}
+
+Signal signal_named(const std::string& name, ConfigTable table) {
+  for (int i = 0; i < kSignals; ++i) {
+    if (kSignalNames[static_cast<std::size_t>(i)] == name) return static_cast<Signal>(i);
+  }
+  std::string known;
+  for (const std::string_view one : kSignalNames) known += (known.empty() ? "" : ", ") + std::string{one};
+  table.fail("signal", fmt::format("\"{}\" is not one of {}", name, known));
+  return Signal::kOne;
+}
+
+Term read_term(ConfigTable table, double tick_s) {
+  Term term;
+  term.signal = signal_named(table.required<std::string>("signal"), table);
+  term.transform = table.choice<Transform>("transform",
+                                           {{"none", Transform::kNone},
+                                            {"sine", Transform::kSine},
+                                            {"absolute_sine", Transform::kAbsoluteSine},
+                                            {"load_factor", Transform::kLoadFactor}},
+                                           Transform::kNone);
+  term.lowpass_s = table.optional<double>("lowpass_s", 0.0, Range{0.0, 60.0});
+  term.delay_ticks =
+      delay_in_ticks(table, "delay_s", table.optional<double>("delay_s", 0.0, Range{0.0, 60.0}), tick_s);
+  if (const auto minus = table.if_present<double>("minus_delay_s", Range{0.0, 60.0})) {
+    term.minus_delay_ticks = delay_in_ticks(table, "minus_delay_s", *minus, tick_s);
+  }
+  return term;
+}
+
+std::string unit_of(Signal signal) {
+  const std::string_view name = to_string(signal);
+  if (name.ends_with("_m_s2")) return "m/s^2";
+  if (name.ends_with("_rad_s")) return "rad/s";
+  if (name.ends_with("_rad")) return "rad";
+  if (name.ends_with("_m_s")) return "m/s";
+  if (name.ends_with("_m")) return "m";
+  return "1";
+}
+
+DelayedRegressionParams read_regression(ConfigTable table, int terms, double tick_s) {
+  DelayedRegressionParams params;
+  params.terms = terms;
+  const double delay_s = table.optional<double>("learning_delay_s", 2.0, Range{0.1, 60.0});
+  const double delay_ticks = std::round(delay_s / tick_s);
+  if (delay_ticks < 1 || delay_ticks >= kMostLearningDelayTicks) {
+    table.fail("learning_delay_s",
+               fmt::format("{} is not between 1 and {} ticks", delay_s, kMostLearningDelayTicks - 1));
+  } else {
+    params.delay_ticks = static_cast<int>(delay_ticks);
+  }
+  params.huber_sigmas = table.optional<double>("huber_sigmas", params.huber_sigmas, Range{0.5, 100.0});
+  params.ridge = table.optional<double>("ridge", params.ridge, Range{0.0, 1e6});
+  params.extrapolation_gain =
+      table.optional<double>("extrapolation_gain", params.extrapolation_gain, Range{0.0, 1e6});
+  return params;
+}
+
+CusumParams read_cusum(ConfigTable table) {
+  CusumParams params;
+  params.drift_sigmas = table.required<double>("drift_sigmas", Range{0.0, 10.0});
+  params.clip_sigmas = table.optional<double>("clip_sigmas", params.clip_sigmas, Range{0.1, 100.0});
+  params.threshold = table.required<double>("threshold", Range{0.1, 1000.0});
+  if (params.clip_sigmas <= params.drift_sigmas) {
+    table.fail("clip_sigmas",
+               fmt::format("{} must exceed drift_sigmas ({})", params.clip_sigmas, params.drift_sigmas),
+               {"drift_sigmas"});
+  }
+  return params;
+}
+
+FaultLifeCycleParams read_life_cycle(ConfigTable table) {
+  FaultLifeCycleParams params;
+  params.latched = table.optional<bool>("latched", false);
+  params.clear_ratio = table.optional<double>("clear_ratio", params.clear_ratio, Range{0.0, 0.9});
+  params.clear_after = from_seconds(
+      table.optional<double>("clear_after_s", to_seconds(params.clear_after), Range{0.1, 600.0}));
+  return params;
+}
+
+ChannelMeaning read_meaning(ConfigTable table, Signal response) {
+  ChannelMeaning meaning;
+  meaning.name = table.required<std::string>("name");
+  meaning.component = table.required<std::string>("component");
+  meaning.fault_kind = table.required<std::string>("fault_kind");
+  meaning.severity = table.choice<Severity>(
+      "severity",
+      {{"advisory", Severity::kAdvisory}, {"caution", Severity::kCaution}, {"warning", Severity::kWarning}});
+  meaning.summary = table.required<std::string>("summary");
+  meaning.candidates = table.optional<std::vector<std::string>>("candidates", {});
+  meaning.unit = unit_of(response);
+  return meaning;
+}
+
+ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
+  ChannelParams params;
+  params.warm_up = warm_up;
+  params.response = read_term(table.required_table("response"), tick_s);
+  const auto terms = table.tables("terms");
+  if (terms.empty() || terms.size() > static_cast<std::size_t>(kMostTerms)) {
+    table.fail("terms", fmt::format("{} terms; must be 1 to {}", terms.size(), kMostTerms));
+  } else {
+    for (const ConfigTable& term : terms) {
+      params.terms[static_cast<std::size_t>(params.term_count++)] = read_term(term, tick_s);
+    }
+  }
+  params.side =
+      table.choice<Side>("side", {{"low", Side::kLow}, {"high", Side::kHigh}, {"both", Side::kBoth}});
+  params.regression = read_regression(table, params.term_count, tick_s);
+  params.cusum = read_cusum(table);
+  params.life_cycle = read_life_cycle(table);
+  return params;
+}
+
+}  // namespace
+
+rt::Expected<ResponseConfig> ResponseConfig::load(const std::string& path,
+                                                  const std::vector<std::string>& overrides) {
+  auto file = rt::ConfigFile::load(path, overrides);
+  ConfigTable root = file.root();
+  ResponseConfig config;
+  config.vehicle = rt::VehicleFile::named_by(root).name;
+
+  ConfigTable input = root.table("input");
+  config.imu_sensor_id = input.optional<int>("imu_sensor_id", 0, Range{0, 127});
+  const double tick_s = input.optional<double>("tick_period_s", 0.1, Range{0.01, 1.0});
+  MonitorParams& monitor = config.monitor;
+  monitor.tick_period = from_seconds(tick_s);
+  monitor.longest_gap = from_seconds(input.optional<double>("longest_gap_s", 1.0, Range{0.1, 60.0}));
+  monitor.input_timeout = from_seconds(input.optional<double>("input_timeout_s", 2.0, Range{0.1, 60.0}));
+  monitor.min_groundspeed_m_s = input.optional<double>("min_groundspeed_m_s", 0.0, Range{0.0, 100.0});
+  const Duration warm_up = from_seconds(input.optional<double>("warm_up_s", 20.0, Range{0.0, 600.0}));
+
+  const auto channels = root.tables("channel", {.unique_key = "name"});
+  if (channels.empty() || channels.size() > static_cast<std::size_t>(kMostChannels)) {
+    root.fail("channel", fmt::format("{} channels; must be 1 to {}", channels.size(), kMostChannels));
+  } else {
+    for (const ConfigTable& table : channels) {
+      ChannelParams& params = monitor.channels[static_cast<std::size_t>(monitor.channel_count++)];
+      params = read_channel(table, tick_s, warm_up);
+      config.channels.push_back(read_meaning(table, params.response.signal));
+    }
+  }
+  config.hash = file.hash();
+  return file.finish(std::move(config));
+}
+
+}  // namespace airworthy::response

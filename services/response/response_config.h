@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/detectors/response/response_monitor.h"
+#include "runtime/config/config_file.h"
+
+namespace airworthy::response {
+
+/// How urgent a fault is, and with that the advice the ground gives.
+enum class Severity : std::int8_t { kAdvisory = 1, kCaution = 2, kWarning = 3 };
+
+/// What an alarm of a channel means, in words.
+struct ChannelMeaning {
+  std::string name;
+  std::string component;
+  std::string fault_kind;
+  Severity severity = Severity::kCaution;
+  std::string summary;
+  std::string unit;  ///< of the response
+  std::vector<std::string> candidates;
+};
+
+struct ResponseConfig {
+  std::string vehicle;
+  std::string hash;
+  int imu_sensor_id = 0;
+  MonitorParams monitor;
+  std::vector<ChannelMeaning> channels;  ///< in the order of monitor.channels
+
+  [[nodiscard]] static rt::Expected<ResponseConfig> load(const std::string& path,
+                                                         const std::vector<std::string>& overrides);
+};
+
+}  // namespace airworthy::response
