@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "runtime/bus/channels.h"
+
 namespace airworthy::rt {
 namespace {
 
@@ -24,6 +26,28 @@ Expected<std::unique_ptr<LogBus>> LogBus::open(const std::string& path) {
   lcm_eventlog_t* log = lcm_eventlog_create(path.c_str(), "r");
   if (log == nullptr) return fail_with(fmt::format("{}: {}", path, std::strerror(errno)));
   return std::unique_ptr<LogBus>{new LogBus{log, path}};
+}
+
+Expected<LogBus::Contents> LogBus::survey(const std::string& path) {
+  auto bus = open(path);
+  if (!bus) return tl::unexpected{bus.error()};
+  Contents contents;
+  ManualClock clock;
+  const auto played = (*bus)->play(clock, [&contents](std::string_view channel) {
+    ++contents.messages[std::string{channel}];
+    const std::size_t slash = channel.find('/');
+    if (contents.vehicle.empty() && slash != std::string_view::npos) {
+      for (const ChannelInfo& info : channel::kAll) {
+        if (info.name == channel.substr(slash + 1)) contents.vehicle = channel.substr(0, slash);
+      }
+    }
+    return false;
+  });
+  if (!played) return tl::unexpected{played.error()};
+  if (contents.vehicle.empty()) {
+    return fail_with(fmt::format("{}: no channel <vehicle>/<CHANNEL> of lcmtypes/channels.toml in it", path));
+  }
+  return contents;
 }
 
 Expected<void> LogBus::publish(const std::string& channel, std::span<const std::uint8_t> payload) {

@@ -26,7 +26,17 @@ class LogBus final : public Bus {
     std::int64_t skipped_events = 0;  ///< numbers missing in the file
   };
 
+  /// What a recording holds.
+  struct Contents {
+    std::string vehicle;  ///< of the first channel named <vehicle>/<CHANNEL> that the table knows
+    std::map<std::string, std::int64_t, std::less<>> messages;  ///< by full channel name
+    [[nodiscard]] bool has(std::string_view channel) const { return messages.contains(channel); }
+  };
+
   [[nodiscard]] static Expected<std::unique_ptr<LogBus>> open(const std::string& path);
+
+  /// Reads through a recording without playing it. No channel of ours in it is an error.
+  [[nodiscard]] static Expected<Contents> survey(const std::string& path);
 
   [[nodiscard]] Expected<void> publish(const std::string& channel,
                                        std::span<const std::uint8_t> payload) override;

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/eval/scoring.h"
+
+namespace airworthy::eval {
+
+struct Evaluation {
+  std::vector<Flight> flights;
+  std::vector<Score> scores;           ///< by the rules as they stand
+  std::vector<Score> tolerant_scores;  ///< beside it: an alarm up to 0.5 s before the onset finds the fault
+};
+
+/// One line per flight, totals, and a line per fault type.
+[[nodiscard]] std::string to_table(const Evaluation& evaluation);
+
+/// {"flights": [...], "totals": {...}}; what is not known is null.
+[[nodiscard]] std::string to_json(const Evaluation& evaluation);
+
+}  // namespace airworthy::eval
