@@ -127,6 +127,7 @@ class ConfigTable {
   template <class T>
   static std::vector<std::string_view> names(std::initializer_list<Word<T>> words) {
     std::vector<std::string_view> result;
+    result.reserve(words.size());
     for (const Word<T>& word : words) result.push_back(word.word);
     return result;
   }
@@ -165,7 +166,7 @@ class ConfigTable {
 /// a file that cannot be read.
 class ConfigFile {
  public:
-  static constexpr std::size_t kMaxBytes = 1024 * 1024;
+  static constexpr std::size_t kMaxBytes = 1U << 20U;
 
   /// `overrides` are `key.path=value`. A value that is not TOML is a string.
   [[nodiscard]] static ConfigFile load(const std::filesystem::path& path,

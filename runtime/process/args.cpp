@@ -27,6 +27,7 @@ template <class Enum>
 void add_words(CLI::App& app, const std::string& option, Enum& target,
                const std::vector<std::pair<std::string, Enum>>& words, const std::string& about) {
   std::vector<std::string> names;
+  names.reserve(words.size());
   for (const auto& [name, value] : words) names.push_back(name);
   const auto choose = [&target, words, names, option](const std::string& chosen) {
     for (const auto& [name, value] : words) {

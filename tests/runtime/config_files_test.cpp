@@ -37,6 +37,24 @@ TEST(ConfigFiles, SyntaxErrorsStayOnOneLine) {
   EXPECT_EQ(text.find("t.toml:2:"), 0U) << text;
 }
 
+TEST(ConfigFiles, LettersOutsideStrings) {
+  EXPECT_EQ(syntax_error("\xc3\xa4 = 1\n"),
+            "t.toml:1:1: Error while parsing root table: expected keys, tables, whitespace or comments, saw "
+            "'\xc3\xa4'");
+  EXPECT_EQ(syntax_error("a = \xc3\xa4\n"),
+            "t.toml:1:5: Error while parsing value: could not determine value type");
+  EXPECT_EQ(
+      syntax_error("[\xef\xb2\xbf]\n"),
+      "t.toml:1:2: Error while parsing key: expected bare key starting character or string delimiter, saw "
+      "'\xef\xb2\xbf'");
+}
+
+TEST(ConfigFiles, LettersAfterALineEndingBackslash) {
+  auto file = ConfigFile::parse("a = \"\"\"x\\\n  \xc3\xa4\"\"\"\n", "t.toml");
+  EXPECT_EQ(file.root().required<std::string>("a"), "x\xc3\xa4");
+  EXPECT_EQ(errors_of(file), "");
+}
+
 TEST(ConfigFiles, BinaryGarbage) {
   EXPECT_EQ(syntax_error(std::string_view{"\x7f"
                                           "ELF\x02\x01\x01\0\0\0",
