@@ -81,7 +81,7 @@ def play(arguments):
     os.set_blocking(master, False)
     time.sleep(arguments.start_delay)
     counts, played, received, first_us, last_us = {}, 0, 0, None, 0
-    started = time.monotonic()
+    started, first_boottime_us = time.monotonic(), time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1000
     for time_us, system, message, packet in packets(arguments.flight):
         if system == GROUND_STATION:
             continue
@@ -104,6 +104,7 @@ def play(arguments):
     os.close(slave)
     arguments.link.unlink(missing_ok=True)
     print(json.dumps({"packets": played, "flown_s": round((last_us - (first_us or 0)) / 1e6, 3),
+                      "first_packet_utc_us": first_us, "first_packet_boottime_us": first_boottime_us,
                       "per_message": counts, "bytes_from_driver": received}), flush=True)
 
 
