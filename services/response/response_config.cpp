@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "runtime/config/vehicle.h"
@@ -82,14 +83,30 @@ DelayedRegressionParams read_regression(ConfigTable table, int terms, double tic
 
 CusumParams read_cusum(ConfigTable table) {
   CusumParams params;
-  params.drift_sigmas = table.required<double>("drift_sigmas", Range{0.0, 10.0});
-  params.clip_sigmas = table.optional<double>("clip_sigmas", params.clip_sigmas, Range{0.1, 100.0});
   params.threshold = table.required<double>("threshold", Range{0.1, 1000.0});
-  if (params.clip_sigmas <= params.drift_sigmas) {
-    table.fail("clip_sigmas",
-               fmt::format("{} must exceed drift_sigmas ({})", params.clip_sigmas, params.drift_sigmas),
-               {"drift_sigmas"});
+  return params;
+}
+
+EvidenceParams read_evidence(ConfigTable table) {
+  EvidenceParams params;
+  params.alternative = table.choice<Alternative>(
+      "alternative", {{"shift", Alternative::kShift}, {"gain_loss", Alternative::kGainLoss}},
+      Alternative::kShift);
+  if (params.alternative == Alternative::kShift) {
+    params.drift_sigmas = table.required<double>("drift_sigmas", Range{0.0, 10.0});
+    params.clip_sigmas = table.optional<double>("clip_sigmas", 4.0, Range{0.1, 100.0});
+    if (params.clip_sigmas <= params.drift_sigmas) {
+      table.fail("clip_sigmas",
+                 fmt::format("{} must exceed drift_sigmas ({})", params.clip_sigmas, params.drift_sigmas),
+                 {"drift_sigmas"});
+    }
+    return params;
   }
+  params.remaining_gain = table.required<double>("remaining_gain", Range{0.0, 1.0}.without_max());
+  params.sigma_inflation =
+      table.optional<double>("sigma_inflation", params.sigma_inflation, Range{1.0, 10.0});
+  params.clip_sigmas = table.optional<double>("clip_sigmas", 3.0, Range{0.1, 100.0});
+  params.most_per_tick = table.optional<double>("most_per_tick", params.most_per_tick, Range{0.01, 100.0});
   return params;
 }
 
@@ -124,12 +141,19 @@ ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
   if (terms.empty() || terms.size() > static_cast<std::size_t>(kMostTerms)) {
     table.fail("terms", fmt::format("{} terms; must be 1 to {}", terms.size(), kMostTerms));
   } else {
-    for (const ConfigTable& term : terms) {
-      params.terms[static_cast<std::size_t>(params.term_count++)] = read_term(term, tick_s);
+    for (ConfigTable term : terms) {
+      const auto index = static_cast<std::size_t>(params.term_count++);
+      params.terms[index] = read_term(term, tick_s);
+      params.commanded[index] = term.optional<bool>("commanded", false);
     }
   }
-  params.side =
-      table.choice<Side>("side", {{"low", Side::kLow}, {"high", Side::kHigh}, {"both", Side::kBoth}});
+  params.evidence = read_evidence(table);
+  if (params.evidence.alternative == Alternative::kShift) {
+    params.side =
+        table.choice<Side>("side", {{"low", Side::kLow}, {"high", Side::kHigh}, {"both", Side::kBoth}});
+  } else if (std::count(params.commanded.begin(), params.commanded.end(), true) == 0) {
+    table.fail("terms", "a gain_loss channel needs at least one term with commanded = true");
+  }
   params.regression = read_regression(table, params.term_count, tick_s);
   params.cusum = read_cusum(table);
   params.life_cycle = read_life_cycle(table);

@@ -36,7 +36,10 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
   verdict.sigma = prediction.sigma;
   if (status == UpdateStatus::kConverging || flown < params_.warm_up) return verdict;
   verdict.reason = NotJudged::kJudged;
-  if (!muted) accumulate(prediction.innovation / prediction.sigma, now);
+  for (int i = 0; i < params_.term_count; ++i) {
+    if (params_.commanded[static_cast<std::size_t>(i)]) verdict.commanded += regression_.theta()(i) * x(i);
+  }
+  if (!muted) accumulate(verdict, now);
 
   const Cusum& worse = low_.test_ratio() >= high_.test_ratio() ? low_ : high_;
   verdict.test_ratio = worse.test_ratio();
@@ -67,9 +70,15 @@ void ResponseChannel::restart_history() noexcept {
   regression_.drop_unlearned();
 }
 
-void ResponseChannel::accumulate(double z, TimePoint now) noexcept {
-  if (params_.side != Side::kHigh) low_.step(-z, now);
-  if (params_.side != Side::kLow) high_.step(z, now);
+void ResponseChannel::accumulate(const ChannelVerdict& verdict, TimePoint now) noexcept {
+  const double innovation = verdict.observed - verdict.expected;
+  if (params_.evidence.alternative == Alternative::kGainLoss) {
+    low_.step(gain_loss_evidence(params_.evidence, innovation, verdict.commanded, verdict.sigma), now);
+    return;
+  }
+  const double z = innovation / verdict.sigma;
+  if (params_.side != Side::kHigh) low_.step(shift_evidence(params_.evidence, -z), now);
+  if (params_.side != Side::kLow) high_.step(shift_evidence(params_.evidence, z), now);
 }
 
 void ResponseChannel::track_magnitude(const ChannelVerdict& verdict) noexcept {

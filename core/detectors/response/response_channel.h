@@ -4,6 +4,7 @@
 
 #include "core/detectors/cusum.h"
 #include "core/detectors/fault_life_cycle.h"
+#include "core/detectors/response/evidence.h"
 #include "core/detectors/response/regressor.h"
 #include "core/estimators/delayed_regression.h"
 
@@ -19,7 +20,9 @@ struct ChannelParams {
   Term response;
   int term_count = 0;
   std::array<Term, kMostTerms> terms{};
-  Side side = Side::kBoth;
+  std::array<bool, kMostTerms> commanded{};  ///< gain loss: these terms make up the commanded response û
+  Side side = Side::kBoth;                   ///< shift: which deviation is a fault
+  EvidenceParams evidence;
   DelayedRegressionParams regression;
   CusumParams cusum;
   FaultLifeCycleParams life_cycle;
@@ -34,6 +37,7 @@ struct ChannelVerdict {
   NotJudged reason = NotJudged::kConverging;
   double observed = 0;
   double expected = 0;
+  double commanded = 0;   ///< the commanded part of it, for a gain loss
   double sigma = 0;       ///< of observed − expected, predicted
   double test_ratio = 0;  ///< alarm at 1
   FaultLifeCycle::Transition transition = FaultLifeCycle::Transition::kNone;
@@ -59,15 +63,15 @@ class ResponseChannel {
   [[nodiscard]] bool fault_active() const noexcept { return life_cycle_.active(); }
 
  private:
-  void accumulate(double z, TimePoint now) noexcept;
+  void accumulate(const ChannelVerdict& verdict, TimePoint now) noexcept;
   void track_magnitude(const ChannelVerdict& verdict) noexcept;
 
   ChannelParams params_;
   Regressor response_;
   std::array<Regressor, kMostTerms> regressors_;
   DelayedRegression<double, kMostTerms, kMostLearningDelayTicks> regression_;
-  Cusum low_;
-  Cusum high_;
+  Cusum low_;   ///< evidence of a downward shift, or of a lost gain
+  Cusum high_;  ///< evidence of an upward shift
   FaultLifeCycle life_cycle_;
   TimePoint onset_;
   double innovation_sum_ = 0;
