@@ -5,40 +5,13 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/text/utf8.h"
+
 namespace airworthy::health {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kLargestTime_us = std::int64_t{1} << 60;
-
-unsigned byte_at(const std::string& text, std::size_t i) { return static_cast<unsigned char>(text[i]); }
-
-/// Length of the valid UTF-8 sequence at `i`, 0 if there is none (overlong forms and surrogates are none).
-std::size_t utf8_length(const std::string& text, std::size_t i) {
-  const unsigned lead = byte_at(text, i);
-  if (lead < 0x80) return 1;
-  std::size_t length = 0;
-  if (lead >= 0xC2 && lead <= 0xDF) length = 2;
-  if (lead >= 0xE0 && lead <= 0xEF) length = 3;
-  if (lead >= 0xF0 && lead <= 0xF4) length = 4;
-  if (length == 0 || i + length > text.size()) return 0;
-  for (std::size_t k = 1; k < length; ++k) {
-    if ((byte_at(text, i + k) & 0xC0U) != 0x80U) return 0;
-  }
-  const unsigned second = byte_at(text, i + 1);
-  if (lead == 0xE0 && second < 0xA0) return 0;
-  if (lead == 0xED && second > 0x9F) return 0;
-  if (lead == 0xF0 && second < 0x90) return 0;
-  if (lead == 0xF4 && second > 0x8F) return 0;
-  return length;
-}
-
-/// C0, DEL and C1 (U+0080 to U+009F): all that a terminal could obey.
-bool is_control(const std::string& text, std::size_t i, std::size_t length) {
-  const unsigned lead = byte_at(text, i);
-  if (length == 1) return lead < 0x20 || lead == 0x7F;
-  return lead == 0xC2 && byte_at(text, i + 1) < 0xA0;
-}
 
 class Bounder {
  public:
@@ -101,8 +74,8 @@ class Bounder {
     from.time = clamp_time(from.time);
     from.sent = clamp_time(from.sent);
   }
-  void name(std::string& s) const { s = clean_text(s, limits_.name_bytes); }
-  void text(std::string& s) const { s = clean_text(s, limits_.text_bytes); }
+  void name(std::string& s) const { s = clean_text<std::string>(s, limits_.name_bytes); }
+  void text(std::string& s) const { s = clean_text<std::string>(s, limits_.text_bytes); }
 
   template <class T>
   bool cut(std::vector<T>& list, std::size_t most) {
@@ -117,25 +90,6 @@ class Bounder {
 };
 
 }  // namespace
-
-std::string clean_text(const std::string& text, std::size_t max_bytes) {
-  std::string out;
-  out.reserve(std::min(text.size(), max_bytes));
-  for (std::size_t i = 0; i < text.size();) {
-    const std::size_t length = utf8_length(text, i);
-    const std::size_t written = length == 0 || is_control(text, i, length) ? 1 : length;
-    if (out.size() + written > max_bytes) break;
-    if (length == 0) {
-      out += '?';
-    } else if (is_control(text, i, length)) {
-      out += ' ';
-    } else {
-      out.append(text, i, length);
-    }
-    i += std::max<std::size_t>(length, 1);
-  }
-  return out;
-}
 
 TimePoint clamp_time(TimePoint t) { return from_us(std::clamp(to_us(t), -kLargestTime_us, kLargestTime_us)); }
 

@@ -10,34 +10,6 @@
 namespace airworthy::health {
 namespace {
 
-using namespace std::string_literals;
-
-TEST(CleanText, KeepsWhatIsPrintable) {
-  EXPECT_EQ(clean_text("rotor 2", 64), "rotor 2");
-  EXPECT_EQ(clean_text("12 g·mm ± 3 °C 漢 🚁", 64), "12 g·mm ± 3 °C 漢 🚁");
-  EXPECT_EQ(clean_text("", 64), "");
-}
-
-TEST(CleanText, DefusesControlCharacters) {
-  EXPECT_EQ(clean_text("a\x1b[2Jb", 64), "a [2Jb");
-  EXPECT_EQ(clean_text("a\r\n\tb\0c\x7f"s, 64), "a   b c ");
-  EXPECT_EQ(clean_text("a\xc2\x9b 31m", 64), "a  31m") << "the one-character form of ESC [";
-}
-
-TEST(CleanText, ReplacesBrokenUtf8) {
-  EXPECT_EQ(clean_text("a\xff\xfe", 64), "a??");
-  EXPECT_EQ(clean_text("\xc0\xaf", 64), "??") << "overlong";
-  EXPECT_EQ(clean_text("\xed\xa0\x80", 64), "???") << "surrogate";
-  EXPECT_EQ(clean_text("\xf4\x90\x80\x80", 64), "????") << "beyond U+10FFFF";
-  EXPECT_EQ(clean_text("\xe6\xbc", 64), "??") << "cut short";
-}
-
-TEST(CleanText, CutsBetweenCharacters) {
-  EXPECT_EQ(clean_text("aa漢漢", 5), "aa漢");
-  EXPECT_EQ(clean_text("aa漢漢", 7), "aa漢");
-  EXPECT_EQ(clean_text(std::string(10'000, 'x'), 64).size(), 64U);
-}
-
 TEST(BoundInput, ImpossibleNumbersBecomeUnknown) {
   const double infinity = std::numeric_limits<double>::infinity();
   Speaker speaker{"p"};
