@@ -20,7 +20,7 @@ constexpr auto kKeepRoute =
     "with ifupdown, in /etc/network/interfaces below 'iface lo inet loopback':\n"
     "  up ip route replace 224.0.0.0/4 dev lo";
 
-constexpr std::int64_t kMebibyte = 1024 * 1024;
+constexpr std::int64_t kMebibyte = std::int64_t{1024} * 1024;
 constexpr std::int64_t kFewDefaultBuffer_bytes = kMebibyte;
 constexpr std::int64_t kLittleDisk_bytes = 1024 * kMebibyte;
 constexpr std::int64_t kNoDisk_bytes = 100 * kMebibyte;

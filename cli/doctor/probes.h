@@ -61,6 +61,6 @@ struct Probes {
 };
 
 /// What a process of ours asks for, so that a burst of messages survives a pause of its reader.
-inline constexpr std::int64_t kWantedReceiveBuffer_bytes = 4 * 1024 * 1024;
+inline constexpr std::int64_t kWantedReceiveBuffer_bytes = std::int64_t{4} * 1024 * 1024;
 
 }  // namespace airworthy::doctor
