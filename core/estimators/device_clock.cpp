@@ -105,7 +105,7 @@ DeviceClock::Reading DeviceClock::read(std::uint64_t stamp, TimePoint arrival,
   used_offset_us_ = offset_us_;
   if (round_trip_offset_us) {
     const std::int64_t path_us = offset_us_ - *round_trip_offset_us;
-    if (path_us >= -params_.early_tolerance.count() && path_us <= params_.max_path_delay.count()) {
+    if (path_us >= -params_.round_trip_slack.count() && path_us <= params_.max_path_delay.count()) {
       uses_round_trip_ = true;
       used_offset_us_ = *round_trip_offset_us;
     }

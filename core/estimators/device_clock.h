@@ -71,13 +71,14 @@ class DeviceClock {
  public:
   struct Params {
     Duration max_backward{1'000'000};
-    Duration early_tolerance{20'000};
+    Duration early_tolerance{1'000'000};
     Duration agreement{2'000'000};  ///< between stamps that confirm each other, device time against arrival
     int confirmations = 3;
     Duration window{10'000'000};
     Duration step_threshold{100'000};
     double max_drift_ratio = 200e-6;
-    Duration max_path_delay{1'000'000};  ///< largest smallest delay that a round-trip offset may imply
+    Duration max_path_delay{1'000'000};  ///< largest smallest delay that a round-trip offset may imply ...
+    Duration round_trip_slack{100'000};  ///< ... and how far below zero its own error may put that
   };
   enum class Status {
     kOk,
