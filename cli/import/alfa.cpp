@@ -284,7 +284,7 @@ rt::Expected<void> read_failures(const fs::path& file, std::string_view topic_na
       };
       // Repeated as long as the fault lasts: the first one is the onset.
       if (std::none_of(truths.begin(), truths.end(), same)) {
-        truths.push_back({row.component, row.fault_kind, topic->time()});
+        truths.push_back({row.component, row.fault_kind, topic->time(), {}, kNaN});
       }
     }
     if (!known) return topic->reader().fail(fmt::format("failure code {} is not known", code));
@@ -310,7 +310,7 @@ rt::Expected<std::vector<Truth>> read_truth(const fs::path& folder) {
       return rt::fail_with(
           fmt::format("{}: called no_failure, but its failure_status topics report one", folder.string()));
     }
-    truths.push_back({"", kNoFault, std::nullopt});
+    truths.push_back({"", kNoFault, {}, {}, kNaN});
   }
   return truths;
 }

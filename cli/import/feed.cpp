@@ -1,20 +1,29 @@
 #include "cli/import/feed.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace airworthy::importer {
 namespace {
 
 constexpr int kMessagesPerReport = 1000;
 
-void publish(const Truth& truth, TimePoint start, FlightLog& log) {
+void publish(const Truth& truth, FlightLog& log) {
   ground_truth_t message;
   message.component = truth.component;
   message.fault_kind = truth.fault_kind;
-  message.onset_us = truth.fault_kind == kNoFault ? -1 : to_us(truth.onset.value_or(start));
-  message.magnitude = std::numeric_limits<double>::quiet_NaN();
-  log.publish(message, truth.onset.value_or(start));
+  message.onset_us = truth.fault_kind == kNoFault ? -1 : to_us(*truth.time);
+  message.magnitude = truth.magnitude;
+  log.publish(message, *truth.time);
+}
+
+// Gives every truth a time, none before the start, and sorts them.
+void place(std::vector<Truth>& truths, TimePoint start) {
+  for (Truth& truth : truths) {
+    if (truth.after_start) truth.time = start + *truth.after_start;
+    truth.time = std::max(truth.time.value_or(start), start);
+  }
+  std::stable_sort(truths.begin(), truths.end(),
+                   [](const Truth& a, const Truth& b) { return *a.time < *b.time; });
 }
 
 double done_ratio(const std::vector<std::unique_ptr<Feed>>& feeds) {
@@ -40,13 +49,7 @@ rt::Expected<void> merge(std::vector<std::unique_ptr<Feed>>& feeds, std::vector<
   const auto earlier = [](const Feed* a, const Feed* b) { return a->time() < b->time(); };
   if (live.empty()) return {};
   const TimePoint start = (*std::min_element(live.begin(), live.end(), earlier))->time();
-  // A fault older than the recording is there from its start.
-  for (Truth& truth : truths) {
-    if (truth.onset && *truth.onset < start) truth.onset.reset();
-  }
-  std::stable_sort(truths.begin(), truths.end(), [&](const Truth& a, const Truth& b) {
-    return a.onset.value_or(start) < b.onset.value_or(start);
-  });
+  place(truths, start);
 
   auto truth = truths.begin();
   for (int messages = 0; !live.empty(); ++messages) {
@@ -54,15 +57,15 @@ rt::Expected<void> merge(std::vector<std::unique_ptr<Feed>>& feeds, std::vector<
       if (const auto reported = progress(done_ratio(feeds)); !reported) return reported;
     }
     const auto first = std::min_element(live.begin(), live.end(), earlier);
-    for (; truth != truths.end() && truth->onset.value_or(start) <= (*first)->time(); ++truth) {
-      publish(*truth, start, log);
+    for (; truth != truths.end() && *truth->time <= (*first)->time(); ++truth) {
+      publish(*truth, log);
     }
     (*first)->publish(log);
     const auto more = (*first)->next();
     if (!more) return tl::unexpected<rt::Error>{more.error()};
     if (!*more) live.erase(first);
   }
-  for (; truth != truths.end(); ++truth) publish(*truth, start, log);
+  for (; truth != truths.end(); ++truth) publish(*truth, log);
   return progress(1.0);
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "cli/import/flight_log.h"
@@ -30,16 +32,17 @@ class Feed {
 /// Told how far the import is, in 0..1; an error stops it.
 using Progress = std::function<rt::Expected<void>(double done_ratio)>;
 
-/// What really happened, known before the flight is read.
+/// What really happened, and when. Without a time it was so from the start.
 struct Truth {
   std::string component;  ///< empty = whole flight healthy
   std::string fault_kind;
-  std::optional<TimePoint> onset;  ///< none = no fault, or there from the start
+  std::optional<TimePoint> time;        ///< onset, or with kNoFault the end of a fault
+  std::optional<Duration> after_start;  ///< the same, counted from the first message
+  double magnitude = std::numeric_limits<double>::quiet_NaN();
 };
 inline constexpr const char* kNoFault = "none";
 
-/// Publishes everything in order of time; at equal times in order of the feeds. Truth without an onset goes
-/// first, the other at its onset.
+/// Publishes everything in order of time; at equal times truth first, then in order of the feeds.
 [[nodiscard]] rt::Expected<void> merge(std::vector<std::unique_ptr<Feed>>& feeds, std::vector<Truth> truths,
                                        FlightLog& log, const Progress& progress);
 

@@ -47,8 +47,8 @@ void FlightLog::move_to(TimePoint time) {
 rt::Expected<LogSummary> FlightLog::commit() {
   if (const auto committed = writer_->commit(); !committed)
     return tl::unexpected<rt::Error>{committed.error()};
-  return LogSummary{path_, node_.identity().vehicle, to_us(start_), to_us(clock_.now()), writer_->messages(),
-                    {}};
+  return LogSummary{
+      path_, node_.identity().vehicle, to_us(start_), to_us(clock_.now()), writer_->messages(), left_out_};
 }
 
 }  // namespace airworthy::importer

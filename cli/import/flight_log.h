@@ -52,6 +52,9 @@ class FlightLog {
   [[nodiscard]] rt::Node& node() { return node_; }
   void move_to(TimePoint time);
 
+  /// Counts input that is not imported.
+  void leave_out(const std::string& reason) { ++left_out_[reason]; }
+
   /// Gives the log its name; before this, or after a failure, there is none.
   [[nodiscard]] rt::Expected<LogSummary> commit();
 
@@ -68,6 +71,7 @@ class FlightLog {
              rt::Publisher<attitude_t>, rt::Publisher<attitude_setpoint_t>, rt::Publisher<flight_state_t>,
              rt::Publisher<ground_truth_t>>
       publishers_;
+  std::map<std::string, std::int64_t> left_out_;
   bool has_time_ = false;
   TimePoint start_;
 };

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 namespace airworthy::importer {
 namespace {
 
@@ -24,9 +26,26 @@ double us_of(TimeColumn::Unit unit) {
 
 }  // namespace
 
+rt::Expected<TimePoint> TimeColumn::read(const CsvReader& row, std::size_t column) const {
+  // Nanoseconds since 1970 do not fit a double, so they are divided as integers.
+  if (unit == Unit::kNanoseconds) {
+    const auto ns = row.integer(column);
+    if (!ns) return tl::unexpected<rt::Error>{ns.error()};
+    if (*ns < 0) return row.fail_cell(column, "is before time 0");
+    return from_us(*ns / 1000) + base;
+  }
+  const auto value = row.number(column);
+  if (!value) return tl::unexpected<rt::Error>{value.error()};
+  const double us = std::round(*value * us_of(unit));
+  if (us < 0.0) return row.fail_cell(column, "is before time 0");
+  if (us > kLatest_us) return row.fail_cell(column, "is out of range");
+  return from_us(static_cast<std::int64_t>(us)) + base;
+}
+
 rt::Expected<Topic> Topic::open(CsvReader reader, const TimeColumn& time,
-                                const std::vector<std::string>& columns) {
+                                const std::vector<std::string>& columns, EmptyCell empty_cell) {
   Topic topic{std::move(reader)};
+  topic.empty_cell_ = empty_cell;
   topic.time_column_ = time;
   const auto time_index = topic.reader_.column(time.name);
   if (!time_index) return tl::unexpected<rt::Error>{time_index.error()};
@@ -43,7 +62,7 @@ rt::Expected<Topic> Topic::open(CsvReader reader, const TimeColumn& time,
 rt::Expected<bool> Topic::next() {
   const auto more = reader_.next();
   if (!more || !*more) return more;
-  const auto time = read_time();
+  const auto time = time_column_.read(reader_, time_index_);
   if (!time) return tl::unexpected<rt::Error>{time.error()};
   if (has_time_ && *time < time_) {
     return reader_.fail(
@@ -52,27 +71,15 @@ rt::Expected<bool> Topic::next() {
   time_ = *time;
   has_time_ = true;
   for (std::size_t i = 0; i < indices_.size(); ++i) {
+    if (empty_cell_ == EmptyCell::kUnknown && reader_.text(indices_[i]).empty()) {
+      values_[i] = std::numeric_limits<double>::quiet_NaN();
+      continue;
+    }
     const auto value = reader_.number(indices_[i]);
     if (!value) return tl::unexpected<rt::Error>{value.error()};
     values_[i] = *value;
   }
   return true;
-}
-
-rt::Expected<TimePoint> Topic::read_time() const {
-  // Nanoseconds since 1970 do not fit a double, so they are divided as integers.
-  if (time_column_.unit == TimeColumn::Unit::kNanoseconds) {
-    const auto ns = reader_.integer(time_index_);
-    if (!ns) return tl::unexpected<rt::Error>{ns.error()};
-    if (*ns < 0) return reader_.fail_cell(time_index_, "is before time 0");
-    return from_us(*ns / 1000) + time_column_.base;
-  }
-  const auto value = reader_.number(time_index_);
-  if (!value) return tl::unexpected<rt::Error>{value.error()};
-  const double us = std::round(*value * us_of(time_column_.unit));
-  if (us < 0.0) return reader_.fail_cell(time_index_, "is before time 0");
-  if (us > kLatest_us) return reader_.fail_cell(time_index_, "is out of range");
-  return from_us(static_cast<std::int64_t>(us)) + time_column_.base;
 }
 
 }  // namespace airworthy::importer

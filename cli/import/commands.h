@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/import/batch.h"
+
+namespace airworthy::importer {
+
+/// The command line of one import, whatever its kind.
+struct Request {
+  std::vector<std::string> inputs;
+  std::string output;
+  std::string vehicle;  ///< empty: the default of the kind
+  bool json = false;
+  std::string map;               ///< of a table
+  std::optional<double> from_s;  ///< of a table
+  std::optional<double> until_s;
+};
+
+using Logs = rt::Expected<std::vector<LogSummary>>;
+
+[[nodiscard]] Logs run_alfa(const Request& request);
+[[nodiscard]] Logs run_table(const Request& request);
+
+/// Prints the summary on stdout and returns the exit code.
+[[nodiscard]] int report(const std::vector<LogSummary>& logs, const Request& request);
+
+}  // namespace airworthy::importer
