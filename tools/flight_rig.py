@@ -78,7 +78,7 @@ class Rig:
 
     def start_driver(self, overrides=()):
         return self.start_service("airworthy-mavlink", "mavlink.toml",
-                                  ['link.kind="serial"', f'link.path="{self.terminal}"', *overrides], clock="live")
+                                  [f'link="serial:{self.terminal}:921600"', *overrides], clock="live")
 
     def start_flight(self, flight, *options):
         """Plays a recording; its JSON summary is in <folder>/flight.json when it has ended."""
@@ -157,4 +157,5 @@ class Feed:
             self.poll(min(0.05, remaining))
 
     def events(self, phase="raise"):
-        return [document for _, kind, _, document in self.messages if kind == "event" and document["phase"] == phase]
+        faults = [document["event"] for _, kind, _, document in self.messages if kind == "event"]
+        return [fault for fault in faults if fault["phase"] == phase]

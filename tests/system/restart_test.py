@@ -53,13 +53,13 @@ class Restart(SystemTest):
         self.check_kill("airworthy-mavlink", self.system.start_driver)
 
     def test_gateway_with_an_active_fault(self):
-        raised = self.ground.wait_for(lambda kind, document: kind == "event" and document["phase"] == "raise", 60.0)
+        raised = self.ground.wait_for(lambda kind, document: kind == "event" and document["event"]["phase"] == "raise", 60.0)
         self.assertIsNotNone(raised, "the fault was not found")
         self.kill("airworthy-gateway")
         self.system.start_gateway()
         started = time.monotonic()
         full = self.wait_health(lambda health: {"airworthy-mavlink", "airworthy-response"} <= running(health) and any(
-            fault["component"] == raised[3]["component"] and fault["number"] == raised[3]["number"]
+            fault["component"] == raised[3]["event"]["component"] and fault["number"] == raised[3]["event"]["number"]
             for fault in health["faults"]) and health["links"], 5.0)
         self.assertIsNotNone(full, "the restarted gateway does not show the active fault")
         print(f"gateway: full state {full:.2f} s after its restart")
