@@ -74,6 +74,7 @@ void GatewayService::forward(const fault_event_t& message, bool recovered) {
   nlohmann::json body{{"event", to_json(fault, time)}, {"recovered", recovered}};
   time.write(body, "time", node_.clock().now());
   feed_.publish("event", std::move(body));
+  if (fault.phase == health::FaultPhase::kUpdate) return;
   node_.log().info("fault_event", {{"phase", to_word(fault.phase)},
                                    {"component", fault.component},
                                    {"kind", fault.fault_kind},
