@@ -12,7 +12,7 @@ constexpr double kShortestGrowth = 1.05;
 constexpr double kDelayGain = 0.02;
 
 /// Beyond this (292 000 years of µs halved) differences could overflow; no clock reads it.
-constexpr std::uint64_t kMaxStamp = std::uint64_t{1} << 61U;
+constexpr std::uint64_t kMaxStamp64 = std::uint64_t{1} << 61U;
 
 constexpr std::int64_t unit_us(DeviceCounter counter) noexcept {
   return counter == DeviceCounter::kMilliseconds32 ? 1000 : 1;
@@ -20,6 +20,10 @@ constexpr std::int64_t unit_us(DeviceCounter counter) noexcept {
 
 constexpr double resolution_us(DeviceCounter counter) noexcept {
   return static_cast<double>(unit_us(counter));
+}
+
+constexpr std::uint64_t max_stamp(DeviceCounter counter) noexcept {
+  return counter == DeviceCounter::kMicroseconds64 ? kMaxStamp64 : std::numeric_limits<std::uint32_t>::max();
 }
 
 constexpr bool is_32_bit(DeviceCounter counter) noexcept { return counter != DeviceCounter::kMicroseconds64; }
@@ -76,7 +80,7 @@ DeviceClock::Reading DeviceClock::read(std::uint64_t stamp, TimePoint arrival,
                                        std::optional<std::int64_t> round_trip_offset_us) noexcept {
   Reading reading;
   reading.epoch = epoch_;
-  if (stamp > kMaxStamp) return reading;
+  if (stamp > max_stamp(counter_)) return reading;
   if (!started_) {
     started_ = true;
     newest_us_ = static_cast<std::int64_t>(stamp) * unit_us(counter_);
