@@ -6,8 +6,9 @@ namespace airworthy {
 enum class UpdateStatus {
   kFused,
   kConverging,    ///< taken, but no estimate yet
-  kNotFinite,     ///< NaN or infinity in the sample
+  kNotFinite,     ///< NaN or infinity in the sample, or in what it would have made of the state
   kTimeBackward,  ///< not newer than the last sample
+  kNotExcited,    ///< predicted, but too little information in the regressor to learn from
 };
 
 }  // namespace airworthy
