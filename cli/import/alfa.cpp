@@ -42,10 +42,11 @@ rt::Expected<Topic> open_required(const fs::path& folder, const std::string& top
   return open_topic(*file, columns);
 }
 
-/// Airspeed, climb, guidance errors: each the newest value, unknown once older than kTimeout.
+/// Airspeed, climb, guidance errors: each the newest value, unknown once older than kTimeout, the default of
+/// the MAVLink driver.
 class FlightStateFields {
  public:
-  static constexpr Duration kTimeout{2'000'000};
+  static constexpr Duration kTimeout{3'000'000};
 
   void set_errors(TimePoint t, double altitude_m, double airspeed_m_s, double crosstrack_m) {
     errors_time_ = t;

@@ -8,6 +8,7 @@
 #include "cli/import/alfa.h"
 #include "cli/import/summary.h"
 #include "cli/import/table.h"
+#include "cli/import/tlog.h"
 
 namespace airworthy::importer {
 
@@ -18,6 +19,30 @@ Logs run_alfa(const Request& request) {
   return import_batch(items, request.output, [&](const auto& input, const auto& log, const auto& progress) {
     return import_alfa(input, log, vehicle, progress);
   });
+}
+
+Logs run_tlog(const Request& request) {
+  drivers::MavlinkConfig config = default_mavlink_config();
+  config.vehicle = "mavlink";
+  if (!request.config.empty()) {
+    auto loaded = drivers::MavlinkConfig::load(request.config, {});
+    if (!loaded) return tl::unexpected<rt::Error>{loaded.error()};
+    config = std::move(*loaded);
+  }
+  if (!request.vehicle.empty()) config.vehicle = request.vehicle;
+  std::vector<BatchItem> items;
+  for (const std::string& input : request.inputs) items.push_back({input, tlog_name(input)});
+  return import_batch(
+      items, request.output,
+      [&](const auto& input, const auto& log, const auto& progress) -> rt::Expected<LogSummary> {
+        std::vector<Truth> truths;
+        if (!request.truth.empty()) {
+          auto indexed = read_index(request.truth, tlog_name(input));
+          if (!indexed) return tl::unexpected<rt::Error>{indexed.error()};
+          truths = std::move(*indexed);
+        }
+        return import_tlog(input, log, config, std::move(truths), progress);
+      });
 }
 
 Logs run_table(const Request& request) {

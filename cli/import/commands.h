@@ -14,6 +14,8 @@ struct Request {
   std::string output;
   std::string vehicle;  ///< empty: the default of the kind
   bool json = false;
+  std::string truth;             ///< of telemetry logs: table of faults, may be empty
+  std::string config;            ///< of telemetry logs: the driver's, may be empty
   std::string map;               ///< of a table
   std::optional<double> from_s;  ///< of a table
   std::optional<double> until_s;
@@ -22,6 +24,7 @@ struct Request {
 using Logs = rt::Expected<std::vector<LogSummary>>;
 
 [[nodiscard]] Logs run_alfa(const Request& request);
+[[nodiscard]] Logs run_tlog(const Request& request);
 [[nodiscard]] Logs run_table(const Request& request);
 
 /// Prints the summary on stdout and returns the exit code.

@@ -32,6 +32,14 @@ int main(int argc, char** argv) {
   alfa->add_option("-o,--output", request.output, "folder for the logs, <sequence>.lcm each")->required();
   common(alfa, "alfa");
 
+  CLI::App* tlog = app.add_subcommand("tlog", "MAVLink telemetry logs of a ground station");
+  tlog->add_option("FILE", request.inputs, ".tlog or .tlog.xz")->required();
+  tlog->add_option("-o,--output", request.output, "folder for the logs, <name>.lcm each")->required();
+  tlog->add_option("--truth", request.truth, "CSV file with columns sequence, fault, fault_onset_ns");
+  tlog->add_option("--config", request.config,
+                   "configuration of airworthy-mavlink, such as config/mavlink.toml");
+  common(tlog, "mavlink, or that of --config");
+
   CLI::App* table = app.add_subcommand("table", "a CSV file, or a folder of them, by a mapping file");
   table->add_option("FILE", request.inputs, "CSV file, or folder where the map names several")
       ->required()
@@ -48,6 +56,8 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? EX_OK : EX_USAGE;
   }
   importer::stop_on_signals();
-  const auto logs = alfa->parsed() ? importer::run_alfa(request) : importer::run_table(request);
+  const auto logs = alfa->parsed()   ? importer::run_alfa(request)
+                    : tlog->parsed() ? importer::run_tlog(request)
+                                     : importer::run_table(request);
   return logs ? importer::report(*logs, request) : rt::fail(EX_DATAERR, logs.error());
 }

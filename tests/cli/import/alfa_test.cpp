@@ -185,8 +185,8 @@ TEST_F(AlfaTest, FillsTheFlightStateInSiUnits) {
   EXPECT_EQ(state[3].mode, -1);
 }
 
-TEST_F(AlfaTest, AFieldWithoutNewsForTwoSecondsIsUnknown) {
-  add_line("vfr_hud.csv", "1500000002201000000,1500000002200000000,16,21,90,0.5,401,0");
+TEST_F(AlfaTest, AFieldWithoutNewsForThreeSecondsIsUnknown) {
+  add_line("vfr_hud.csv", "1500000003201000000,1500000003200000000,16,21,90,0.5,401,0");
   ASSERT_TRUE(import());
   const auto state = read_log<flight_state_t>(log_, "alfa/FLIGHT_STATE");
   ASSERT_EQ(state.size(), 5U);
