@@ -78,7 +78,7 @@ class Rig:
 
     def start_driver(self, overrides=()):
         return self.start_service("airworthy-mavlink", "mavlink.toml",
-                                  [f'link="serial:{self.terminal}:921600"', *overrides], clock="live")
+                                  [f'link="serial:{self.terminal}:57600"', *overrides], clock="live")
 
     def start_flight(self, flight, *options):
         """Plays a recording; its JSON summary is in <folder>/flight.json when it has ended."""
@@ -157,5 +157,6 @@ class Feed:
             self.poll(min(0.05, remaining))
 
     def events(self, phase="raise"):
-        faults = [document["event"] for _, kind, _, document in self.messages if kind == "event"]
-        return [fault for fault in faults if fault["phase"] == phase]
+        """The faults raised (updated, cleared) so far, in order."""
+        return [document["event"] for _, kind, _, document in self.messages
+                if kind == "event" and document["event"]["phase"] == phase]
