@@ -22,7 +22,7 @@ namespace airworthy::drivers {
 /// the receiver, the receiver's messages to the bus; sends what was configured; tells how the link is doing.
 class MavlinkDriver final : private MessageSink {
  public:
-  static constexpr Duration kStatusPeriod{1'000'000};
+  static constexpr Duration kStatusPeriod{500'000};
   /// A half frame whose rest does not come within this is given up.
   static constexpr Duration kFlushAfter{200'000};
   static constexpr Duration kRateCheckPeriod{5'000'000};

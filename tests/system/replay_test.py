@@ -77,11 +77,11 @@ class Replay(SystemTest):
         time.sleep(0.3)
         return log
 
-    def fly(self, name):
+    def fly(self, name, driver_overrides=()):
         rig = self.rig(SPEED)
         feed = self.feed(rig)
         log = self.record(rig, "live.lcm")
-        self.start_system(rig, feed)
+        self.start_system(rig, feed, driver_overrides)
         flight = rig.start_flight(flights(name)[name], "--start-delay", "1.0")
         while flight.poll() is None:
             feed.poll(0.2)
@@ -127,7 +127,7 @@ class Replay(SystemTest):
                                  [number for number, phase, *_ in second if phase == 1])
 
     def test_frames_per_message_equal_an_independent_count(self):
-        rig, live, summary = self.fly(FLIGHTS[1])
+        rig, live, summary = self.fly(FLIGHTS[1], ["autopilot.system_id=1"])
         bindings = python_bindings(rig.path)
         statuses = [bindings["DRIVER_STATUS"].decode(payload) for _, channel, payload in read_log(live)
                     if channel == f"{VEHICLE}/DRIVER_STATUS"]

@@ -49,10 +49,10 @@ class SystemTest(unittest.TestCase):
         self.addCleanup(feed.close)
         return feed
 
-    def start_system(self, rig, feed):
+    def start_system(self, rig, feed, driver_overrides=()):
         rig.start_gateway()
         rig.start_response()
-        rig.start_driver()
+        rig.start_driver(driver_overrides)
         up = feed.wait_for(lambda kind, document: kind == "health" and alive(document) >= {
             "airworthy-mavlink", "airworthy-response"}, 20)
         self.assertIsNotNone(up, f"the system did not come up: {rig.dead()}")
