@@ -6,6 +6,8 @@
 namespace airworthy::response {
 namespace {
 
+constexpr int kIntervalMemory = 20;  // samples
+
 template <std::size_t... kIndex>
 std::array<ResponseChannel, sizeof...(kIndex)> make_channels(
     const std::array<ChannelParams, sizeof...(kIndex)>& params, std::index_sequence<kIndex...> /*unused*/) {
@@ -39,8 +41,10 @@ bool ResponseMonitor::on_imu(const ImuSample& sample) noexcept {
     gyro_sum_[axis] += sample.gyro_rad_s[axis];
   }
   ++averaged_;
-  // The sample nearest to the end of the period completes it, whatever the rate of the inertial unit.
-  if (sample.time + interval / 2 < tick_time_ + params_.tick_period) return false;
+  typical_interval_ += (interval - typical_interval_) / kIntervalMemory;
+  // The sample nearest to the end of the period completes it, whatever the rate of the inertial unit. At about one
+  // sample a period each is a tick of its own, however it jitters.
+  if (sample.time + typical_interval_ / 2 < tick_time_ + params_.tick_period) return false;
   finish_tick(sample.time);
   return true;
 }
@@ -88,6 +92,7 @@ MonitorState ResponseMonitor::state() const noexcept {
 void ResponseMonitor::restart(TimePoint now) noexcept {
   if (started_) ++gaps_;
   started_ = true;
+  typical_interval_ = params_.tick_period;
   last_sample_ = tick_time_ = now;
   averaged_ = 0;
   accel_sum_ = gyro_sum_ = {};

@@ -92,6 +92,7 @@ class ResponseMonitor {
   bool started_ = false;
   TimePoint last_sample_;
   TimePoint tick_time_;
+  Duration typical_interval_{0};
   int averaged_ = 0;
   std::array<double, 3> accel_sum_{};
   std::array<double, 3> gyro_sum_{};
