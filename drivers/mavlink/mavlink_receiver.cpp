@@ -32,6 +32,10 @@ double plausible(double value, double limit, rt::Counters& counters) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
+double plausible(float value, double limit, rt::Counters& counters) {
+  return plausible(static_cast<double>(value), limit, counters);
+}
+
 }  // namespace
 
 MavlinkReceiver::MavlinkReceiver(const MavlinkConfig& config, MessageSink& sink, rt::Counters& counters,

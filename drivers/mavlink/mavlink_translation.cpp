@@ -31,6 +31,10 @@ double checked(double value, double limit, rt::Counters& counters) {
   return kNaN;
 }
 
+double checked(float value, double limit, rt::Counters& counters) {
+  return checked(static_cast<double>(value), limit, counters);
+}
+
 double checked_temperature(std::optional<double> value_degC, rt::Counters& counters) {
   if (!value_degC || std::isnan(*value_degC)) return kNaN;
   if (*value_degC >= kLeastTemperature_degC && *value_degC <= kMostTemperature_degC) return *value_degC;
@@ -39,9 +43,10 @@ double checked_temperature(std::optional<double> value_degC, rt::Counters& count
 }
 
 /// Three axes of which none may be missing.
-bool fill(double (&to)[3], const std::array<double, 3>& from, double limit) {
-  std::copy(from.begin(), from.end(), to);
-  return std::all_of(from.begin(), from.end(),
+bool fill(double (&to)[3], const std::array<float, 3>& from, double limit) {
+  std::transform(from.begin(), from.end(), std::begin(to),
+                 [](float value) { return static_cast<double>(value); });
+  return std::all_of(std::begin(to), std::end(to),
                      [limit](double value) { return std::isfinite(value) && std::abs(value) <= limit; });
 }
 
@@ -79,8 +84,11 @@ struct Euler {
 };
 
 /// Roll, pitch, yaw (Z-Y-X) of a unit quaternion w, x, y, z; empty if it is far from one.
-std::optional<Euler> to_euler(const std::array<double, 4>& q) {
-  const auto [w, x, y, z] = q;
+std::optional<Euler> to_euler(const std::array<float, 4>& q) {
+  const auto w = static_cast<double>(q[0]);
+  const auto x = static_cast<double>(q[1]);
+  const auto y = static_cast<double>(q[2]);
+  const auto z = static_cast<double>(q[3]);
   const double norm2 = w * w + x * x + y * y + z * z;
   if (!(norm2 > 0.9 && norm2 < 1.1)) return std::nullopt;
   Euler euler;
@@ -129,7 +137,8 @@ std::optional<imu_t> to_imu(const mavlink::HighresImu& message, double averaging
   }
   const bool has_temperature = (message.fields_updated & mavlink::kHighresImuTemperature) != 0;
   imu.temperature_degC = checked_temperature(
-      has_temperature ? std::optional<double>{message.temperature} : std::nullopt, counters);
+      has_temperature ? std::optional<double>{static_cast<double>(message.temperature)} : std::nullopt,
+      counters);
   imu.averaging_window_s = averaging_window_s;
   return imu;
 }
@@ -150,8 +159,8 @@ std::optional<attitude_t> to_attitude(const mavlink::Attitude& message, rt::Coun
     return std::nullopt;
   }
   attitude_t attitude{};
-  attitude.roll_rad = message.roll;
-  attitude.pitch_rad = message.pitch;
+  attitude.roll_rad = static_cast<double>(message.roll);
+  attitude.pitch_rad = static_cast<double>(message.pitch);
   attitude.yaw_rad = checked(message.yaw, 10.0, counters);
   attitude.rates_rad_s[0] = checked(message.rollspeed, kMostRate_rad_s, counters);
   attitude.rates_rad_s[1] = checked(message.pitchspeed, kMostRate_rad_s, counters);
@@ -180,7 +189,7 @@ std::optional<attitude_setpoint_t> to_setpoint(const mavlink::AttitudeTarget& me
   const auto is_ignored = [&message](unsigned bit) { return (message.type_mask & bit) != 0; };
   Euler euler;
   if (!is_ignored(mavlink::kIgnoreAttitude)) {
-    if (const auto commanded = to_euler({message.q[0], message.q[1], message.q[2], message.q[3]})) {
+    if (const auto commanded = to_euler(message.q)) {
       euler = *commanded;
     } else {
       counters.add("refused.quaternion_not_unit");
@@ -270,7 +279,7 @@ std::optional<rotor_command_t> to_rotor_command(const mavlink::ActuatorOutputSta
   return to_rotor_command(config, [&](const OutputMap& map) -> std::optional<double> {
     if (static_cast<std::uint32_t>(map.output) > message.active) return std::nullopt;
     const float value = message.actuator[static_cast<std::size_t>(map.output - 1)];
-    if (std::isfinite(value)) return value;
+    if (std::isfinite(value)) return static_cast<double>(value);
     if (!std::isnan(value)) counters.add("refused.implausible_value");
     return std::nullopt;
   });
@@ -283,7 +292,7 @@ double airspeed_error_m_s(float wire, AirspeedErrorUnit unit, Autopilot autopilo
     unit = autopilot == Autopilot::kArdupilot ? AirspeedErrorUnit::kCentimetresPerSecond
                                               : AirspeedErrorUnit::kMetresPerSecond;
   }
-  const double value = wire;
+  const auto value = static_cast<double>(wire);
   return unit == AirspeedErrorUnit::kCentimetresPerSecond ? value * 0.01 : value;
 }
 

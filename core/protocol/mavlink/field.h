@@ -51,17 +51,30 @@ struct WireType<std::array<T, N>> {
 /// The dialect's name of a type, which the checksum seed is computed over.
 template <class T>
 constexpr std::string_view wire_type_name() noexcept {
-  if constexpr (std::is_same_v<T, char>) return "char";
-  if constexpr (std::is_same_v<T, std::uint8_t>) return "uint8_t";
-  if constexpr (std::is_same_v<T, std::int8_t>) return "int8_t";
-  if constexpr (std::is_same_v<T, std::uint16_t>) return "uint16_t";
-  if constexpr (std::is_same_v<T, std::int16_t>) return "int16_t";
-  if constexpr (std::is_same_v<T, std::uint32_t>) return "uint32_t";
-  if constexpr (std::is_same_v<T, std::int32_t>) return "int32_t";
-  if constexpr (std::is_same_v<T, std::uint64_t>) return "uint64_t";
-  if constexpr (std::is_same_v<T, std::int64_t>) return "int64_t";
-  if constexpr (std::is_same_v<T, float>) return "float";
-  if constexpr (std::is_same_v<T, double>) return "double";
+  if constexpr (std::is_same_v<T, char>) {
+    return "char";
+  } else if constexpr (std::is_same_v<T, std::uint8_t>) {
+    return "uint8_t";
+  } else if constexpr (std::is_same_v<T, std::int8_t>) {
+    return "int8_t";
+  } else if constexpr (std::is_same_v<T, std::uint16_t>) {
+    return "uint16_t";
+  } else if constexpr (std::is_same_v<T, std::int16_t>) {
+    return "int16_t";
+  } else if constexpr (std::is_same_v<T, std::uint32_t>) {
+    return "uint32_t";
+  } else if constexpr (std::is_same_v<T, std::int32_t>) {
+    return "int32_t";
+  } else if constexpr (std::is_same_v<T, std::uint64_t>) {
+    return "uint64_t";
+  } else if constexpr (std::is_same_v<T, std::int64_t>) {
+    return "int64_t";
+  } else if constexpr (std::is_same_v<T, float>) {
+    return "float";
+  } else {
+    static_assert(std::is_same_v<T, double>, "not a type of the wire");
+    return "double";
+  }
 }
 
 template <std::size_t Size>

@@ -10,6 +10,7 @@
 #include "core/protocol/mavlink/messages.h"
 #include "core/protocol/mavlink/parser.h"
 #include "tests/core/protocol/mavlink_vectors.h"
+#include "tests/support/allocation_guard.h"
 
 namespace airworthy::mavlink {
 namespace {
@@ -369,6 +370,26 @@ TEST(MavlinkParser, ResetForgetsAHalfFrame) {
   EXPECT_EQ(parser.counters().bytes_skipped, 20U);
   parser.push(bytes, sink);
   EXPECT_EQ(parser.counters().frames_ok, 1U);
+}
+
+TEST(MavlinkParser, NeverTouchesTheHeap) {
+  const Bytes stream = stream_with([] {
+                         return Bytes{kStartByteV2, 1, 2, 3};
+                       }) +
+                       unknown_frame(1) + bytes_of(testing::kHeartbeat);
+  Parser parser;
+  double sum = 0.0;
+  std::size_t bytes = 0;
+  const test::AllocationGuard guard;
+  const auto sink = [&](const Frame& frame) {
+    if (frame.message_id == Attitude::kId) sum += static_cast<double>(decode<Attitude>(frame).roll);
+    bytes += encode_frame(frame, find_message(frame.message_id)->crc_extra).size;
+  };
+  parser.push(stream, sink);
+  parser.flush(sink);
+  EXPECT_EQ(guard.allocations(), 0U);
+  EXPECT_GT(bytes, 0U);
+  EXPECT_NEAR(sum, 0.1, 1e-6);
 }
 
 // The inputs of the fuzzer, without the fuzzer.
