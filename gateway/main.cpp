@@ -16,8 +16,7 @@ int main(int argc, char** argv) {
   auto process = rt::Process::open(*args, program.name, config->vehicle, config->hash);
   if (!process) return rt::fail(EX_UNAVAILABLE, process.error());
   rt::Node& node = (*process)->node();
-  zmq::context_t context;
-  auto feed = gateway::FeedPublisher::open(context, config->feed, config->vehicle, node.identity().session);
+  auto feed = gateway::FeedPublisher::open(config->feed, config->vehicle, node.identity().session);
   if (!feed) return rt::fail(EX_UNAVAILABLE, feed.error());
   const bool on_ticks = (*process)->on_tick_clock();
   gateway::GatewayService service{node, *config, **feed,

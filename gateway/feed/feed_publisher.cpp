@@ -15,6 +15,19 @@ constexpr int kHeartbeatTimeout_ms = 10'000;
 
 }  // namespace
 
+rt::Expected<std::unique_ptr<FeedPublisher>> FeedPublisher::open(const FeedConfig& config,
+                                                                 const std::string& vehicle,
+                                                                 std::int64_t session) {
+  try {
+    auto context = std::make_unique<zmq::context_t>();
+    auto feed = open(*context, config, vehicle, session);
+    if (feed) (*feed)->own_context_ = std::move(context);
+    return feed;
+  } catch (const zmq::error_t& error) {
+    return rt::fail_with(fmt::format("cannot start ZeroMQ: {}", error.what()));
+  }
+}
+
 rt::Expected<std::unique_ptr<FeedPublisher>> FeedPublisher::open(zmq::context_t& context,
                                                                  const FeedConfig& config,
                                                                  const std::string& vehicle,

@@ -20,7 +20,11 @@ class FeedPublisher {
  public:
   static constexpr int kSchema = 1;
 
-  /// `session` tells one run of the gateway from the next. `context` outlives the publisher.
+  /// `session` tells one run of the gateway from the next.
+  [[nodiscard]] static rt::Expected<std::unique_ptr<FeedPublisher>> open(const FeedConfig& config,
+                                                                         const std::string& vehicle,
+                                                                         std::int64_t session);
+  /// The same in a context at hand, which must outlive it: for inproc:// endpoints.
   [[nodiscard]] static rt::Expected<std::unique_ptr<FeedPublisher>> open(zmq::context_t& context,
                                                                          const FeedConfig& config,
                                                                          const std::string& vehicle,
@@ -36,6 +40,7 @@ class FeedPublisher {
   FeedPublisher(zmq::socket_t socket, std::string vehicle, std::int64_t session)
       : socket_{std::move(socket)}, vehicle_{std::move(vehicle)}, session_{session} {}
 
+  std::unique_ptr<zmq::context_t> own_context_;  // ends after the socket
   zmq::socket_t socket_;
   std::string vehicle_;
   std::int64_t session_;

@@ -128,7 +128,7 @@ std::string story_of(std::vector<Said> said, std::uint64_t seed, double duration
 TEST(InputOrder, ShufflingWithinATickPeriodChangesNothing) {
   int with_faults = 0;
   int with_restarts = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const std::vector<Said> said = Conversation{seed}.run(8.0);
     const std::string first = story_of(said, 1000 + seed, 8.0);
@@ -138,8 +138,8 @@ TEST(InputOrder, ShufflingWithinATickPeriodChangesNothing) {
       ASSERT_EQ(first, story_of(said, 2000 * order + seed, 8.0));
     }
   }
-  EXPECT_EQ(with_faults, 40) << "the conversations must have something to say";
-  EXPECT_GE(with_restarts, 20);
+  EXPECT_EQ(with_faults, 24) << "the conversations must have something to say";
+  EXPECT_GE(with_restarts, 12);
 }
 
 TEST(InputOrder, AMessageHasAWholeTickPeriodToArrive) {
