@@ -71,16 +71,20 @@ def drain(master):
 
 
 def write_all(master, data):
+    """True if the line took the packet; like a serial line it drops what nobody reads."""
+    deadline = time.monotonic() + 0.2
     while data:
-        if select.select([], [master], [], 1.0)[1]:
-            data = data[os.write(master, data):]
+        if not select.select([], [master], [], max(0.0, deadline - time.monotonic()))[1]:
+            return False
+        data = data[os.write(master, data):]
+    return True
 
 
 def play(arguments):
     master, slave = open_terminal(arguments.link)
     os.set_blocking(master, False)
     time.sleep(arguments.start_delay)
-    counts, played, received, first_us, last_us = {}, 0, 0, None, 0
+    counts, played, dropped, received, first_us, last_us = {}, 0, 0, 0, None, 0
     started, first_boottime_us = time.monotonic(), time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1000
     for time_us, system, message, packet in packets(arguments.flight):
         if system == GROUND_STATION:
@@ -95,7 +99,9 @@ def play(arguments):
         if wait > 0.001:
             received += drain(master)
             time.sleep(wait)
-        write_all(master, packet)
+        if not write_all(master, packet):
+            dropped += 1
+            continue
         counts[message] = counts.get(message, 0) + 1
         played, last_us = played + 1, time_us
     time.sleep(0.2)  # the driver reads what the terminal still holds
@@ -103,7 +109,7 @@ def play(arguments):
     os.close(master)
     os.close(slave)
     arguments.link.unlink(missing_ok=True)
-    print(json.dumps({"packets": played, "flown_s": round((last_us - (first_us or 0)) / 1e6, 3),
+    print(json.dumps({"packets": played, "dropped": dropped, "flown_s": round((last_us - (first_us or 0)) / 1e6, 3),
                       "first_packet_utc_us": first_us, "first_packet_boottime_us": first_boottime_us,
                       "per_message": counts, "bytes_from_driver": received}), flush=True)
 

@@ -6,7 +6,7 @@ import json
 import system_test
 from system_test import SystemTest, flights, truth
 
-SPEED = 12.0
+SPEED = 8.0
 AT_ONCE = 3
 
 
