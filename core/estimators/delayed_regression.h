@@ -121,7 +121,7 @@ class DelayedRegression {
   }
 
   void refit() noexcept {  // (3)
-    if (learned_ < 3 * params_.terms) return;
+    if (learned_ < std::int64_t{3} * params_.terms) return;
     Matrix regularised = a_;
     for (Eigen::Index i = 0; i < a_.rows(); ++i) {
       regularised(i, i) += static_cast<Scalar>(params_.ridge) *
