@@ -231,6 +231,18 @@ TEST(DeviceClock, AnAgreeingRoundTripOffsetRemovesTheConstantDelay) {
   EXPECT_EQ(to_us(*link.time), 1'000'000 + kOffset_us + 4000);
 }
 
+TEST(DeviceClock, WhenTheOffsetFallsTimeGoesOnAtHalfItsPace) {
+  Link link{DeviceClock{DeviceCounter::kMicroseconds64}};
+  link.send(1'000'000, 1'000'000 + kOffset_us, 50'000);
+  const std::int64_t before_us = to_us(*link.time);
+  for (std::int64_t i = 1; i <= 20; ++i) {
+    link.send(static_cast<std::uint64_t>(1'000'000 + 10'000 * i), 1'000'000 + 10'000 * i + kOffset_us, 50'000,
+              kOffset_us);
+    const std::int64_t caught_up_us = 1'000'000 + 10'000 * i + kOffset_us;
+    EXPECT_EQ(to_us(*link.time), std::max(before_us + 5'000 * i, caught_up_us)) << i;
+  }
+}
+
 // Property: whatever the stamps, times never go back and never lie after the arrival.
 TEST(DeviceClock, TimesAreMonotoneAndNeverFuture) {
   std::mt19937_64 random{20261122};

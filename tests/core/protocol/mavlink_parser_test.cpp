@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -240,12 +241,17 @@ TEST(MavlinkParser, AnUnknownMessageThatHoldsARealFrameIsAFalseStart) {
   Bytes unknown = unknown_frame(1, 60);
   std::copy(inside.begin(), inside.end(), unknown.begin() + 20);
   EXPECT_EQ(parse(unknown + bytes_of(testing::kHeartbeat)).frames.size(), 2U);
-  // The same when the real frame ends behind the false one.
-  Bytes overlapped = unknown_frame(1, 60);
-  const auto result =
-      parse(Bytes(overlapped.begin(), overlapped.end() - 15) + inside + bytes_of(testing::kHeartbeat));
-  EXPECT_EQ(result.frames.size(), 2U);
-  EXPECT_EQ(result.counters.frames_unverified, 0U);
+  // The same when the real frame ends behind the false one, also while its end is still to come.
+  // Its 16th byte, behind the end of the false one, looks like a start.
+  const Bytes cut = unknown_frame(1, 60);
+  const auto overlapping = to_bytes(encode(Attitude{.roll = std::bit_cast<float>(0x3E00FD00U)}, {1, 1}, 0));
+  ASSERT_EQ(overlapping[15], kStartByteV2);
+  const Bytes stream = Bytes(cut.begin(), cut.end() - 15) + overlapping + bytes_of(testing::kHeartbeat);
+  for (const std::size_t chunk : {SIZE_MAX, std::size_t{1}}) {
+    const auto result = parse(stream, true, chunk);
+    EXPECT_EQ(result.frames.size(), 2U);
+    EXPECT_EQ(result.counters.frames_unverified, 0U);
+  }
 }
 
 TEST(MavlinkParser, AnUnknownMessageNotFollowedByAFrameIsNotTrusted) {
