@@ -133,6 +133,39 @@ ChannelMeaning read_meaning(ConfigTable table, Signal response) {
   return meaning;
 }
 
+ArxParams read_arx(ConfigTable table, Duration input_timeout) {
+  ArxParams params;
+  params.output =
+      table.choice<Signal>("output", {{"roll_rad", Signal::kRoll}, {"pitch_rad", Signal::kPitch}});
+  params.input = table.choice<Signal>("input", {{"roll_setpoint_rad", Signal::kRollSetpoint},
+                                                {"pitch_setpoint_rad", Signal::kPitchSetpoint}});
+  params.samples = table.choice<Samples>(
+      "samples", {{"every_setpoint", Samples::kEverySetpoint}, {"fresh", Samples::kFresh}}, params.samples);
+  params.past_outputs = table.optional<int>("past_outputs", params.past_outputs, Range{0, kMostPastValues});
+  params.past_inputs = table.optional<int>("past_inputs", params.past_inputs, Range{0, kMostPastValues});
+  params.forgetting = table.optional<double>("forgetting", params.forgetting, Range{0.5, 1.0});
+  params.prior_variance = table.optional<double>("prior_variance", params.prior_variance, Range{1e-12, 1e12});
+  params.excitation_floor =
+      table.optional<double>("excitation_floor", params.excitation_floor, Range{0.0, 1e3});
+  params.threshold_sigmas =
+      table.optional<double>("threshold_sigmas", params.threshold_sigmas, Range{0.5, 1e3});
+  const int terms = params.past_outputs + params.past_inputs + 1;
+  params.arm_after_samples =
+      table.optional<int>("arm_after_samples", params.arm_after_samples, Range{2, 1'000'000});
+  if (params.arm_after_samples < terms) {
+    table.fail("arm_after_samples",
+               fmt::format("{} samples cannot tell {} coefficients apart", params.arm_after_samples, terms),
+               {"past_outputs", "past_inputs"});
+  }
+  params.settled_change = table.optional<double>("settled_change", params.settled_change, Range{1e-12, 1e6});
+  params.settled_samples =
+      table.optional<int>("settled_samples", params.settled_samples, Range{1, 1'000'000});
+  params.moments_after_samples =
+      table.optional<int>("moments_after_samples", params.moments_after_samples, Range{0, 1'000'000});
+  params.longest_gap = input_timeout;
+  return params;
+}
+
 ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
   ChannelParams params;
   params.warm_up = warm_up;
@@ -183,9 +216,19 @@ rt::Expected<ResponseConfig> ResponseConfig::load(const std::string& path,
   if (channels.empty() || channels.size() > static_cast<std::size_t>(kMostChannels)) {
     root.fail("channel", fmt::format("{} channels; must be 1 to {}", channels.size(), kMostChannels));
   } else {
-    for (const ConfigTable& table : channels) {
-      ChannelParams& params = monitor.channels[static_cast<std::size_t>(monitor.channel_count++)];
-      params = read_channel(table, tick_s, warm_up);
+    for (ConfigTable table : channels) {
+      const auto index = static_cast<std::size_t>(monitor.channel_count++);
+      ChannelParams& params = monitor.channels[index];
+      monitor.methods[index] = table.choice<Method>(
+          "method", {{"regression", Method::kRegression}, {"arx", Method::kArx}}, Method::kRegression);
+      if (monitor.methods[index] == Method::kArx) {
+        monitor.arx[index] = read_arx(table, monitor.input_timeout);
+        params.response.signal = monitor.arx[index].output;
+        params.warm_up = warm_up;
+        params.life_cycle = read_life_cycle(table);
+      } else {
+        params = read_channel(table, tick_s, warm_up);
+      }
       config.channels.push_back(read_meaning(table, params.response.signal));
     }
   }

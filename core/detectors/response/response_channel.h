@@ -4,6 +4,7 @@
 
 #include "core/detectors/cusum.h"
 #include "core/detectors/fault_life_cycle.h"
+#include "core/detectors/response/channel_verdict.h"
 #include "core/detectors/response/evidence.h"
 #include "core/detectors/response/regressor.h"
 #include "core/estimators/delayed_regression.h"
@@ -27,23 +28,6 @@ struct ChannelParams {
   CusumParams cusum;
   FaultLifeCycleParams life_cycle;
   Duration warm_up{20'000'000};  ///< no verdict before so much flight has been seen
-};
-
-/// Why a channel gives no verdict at a tick.
-enum class NotJudged : std::uint8_t { kJudged, kConverging, kInputUnknown };
-
-/// The verdict of one tick with all that a reader needs to recompute it.
-struct ChannelVerdict {
-  NotJudged reason = NotJudged::kConverging;
-  double observed = 0;
-  double expected = 0;
-  double commanded = 0;   ///< the commanded part of it, for a gain loss
-  double sigma = 0;       ///< of observed − expected, predicted
-  double test_ratio = 0;  ///< alarm at 1
-  FaultLifeCycle::Transition transition = FaultLifeCycle::Transition::kNone;
-  TimePoint onset;             ///< of the active fault
-  double mean_innovation = 0;  ///< since the onset, while a fault is active
-  double mean_innovation_sigma = 0;
 };
 
 /// Expects one measured response from commands and state, and accumulates evidence that it no longer comes.

@@ -14,6 +14,13 @@ std::array<ResponseChannel, sizeof...(kIndex)> make_channels(
   return {ResponseChannel{params[kIndex]}...};
 }
 
+template <std::size_t... kIndex>
+std::array<ArxChannel, sizeof...(kIndex)> make_arx_channels(const MonitorParams& params,
+                                                            std::index_sequence<kIndex...> /*unused*/) {
+  return {
+      ArxChannel{params.arx[kIndex], params.channels[kIndex].life_cycle, params.channels[kIndex].warm_up}...};
+}
+
 bool all_finite(const std::array<double, 3>& v) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
@@ -21,7 +28,9 @@ bool all_finite(const std::array<double, 3>& v) {
 }  // namespace
 
 ResponseMonitor::ResponseMonitor(const MonitorParams& params) noexcept
-    : params_{params}, channels_{make_channels(params.channels, std::make_index_sequence<kMostChannels>{})} {}
+    : params_{params},
+      channels_{make_channels(params.channels, std::make_index_sequence<kMostChannels>{})},
+      arx_{make_arx_channels(params, std::make_index_sequence<kMostChannels>{})} {}
 
 bool ResponseMonitor::on_imu(const ImuSample& sample) noexcept {
   if (!all_finite(sample.accel_m_s2) || !all_finite(sample.gyro_rad_s) ||
@@ -56,6 +65,10 @@ void ResponseMonitor::on_attitude(TimePoint time, double roll_rad, double pitch_
     return;
   }
   attitude_.measure(time, roll_rad, pitch_rad);
+  // A flight controller that repeats a value has not measured again.
+  const bool fresh = !measured_.known || roll_rad != measured_.roll_rad || pitch_rad != measured_.pitch_rad;
+  measured_ = {time, roll_rad, pitch_rad, true};
+  if (fresh) sample_arx(Samples::kFresh, time);
 }
 
 void ResponseMonitor::on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad) noexcept {
@@ -64,6 +77,7 @@ void ResponseMonitor::on_attitude_setpoint(TimePoint time, double roll_rad, doub
     return;
   }
   setpoint_ = {time, roll_rad, pitch_rad, true};
+  sample_arx(Samples::kEverySetpoint, time);
 }
 
 void ResponseMonitor::on_flight_state(const FlightState& state) noexcept {
@@ -97,6 +111,21 @@ void ResponseMonitor::restart(TimePoint now) noexcept {
   averaged_ = 0;
   accel_sum_ = gyro_sum_ = {};
   for (ResponseChannel& channel : channels_) channel.restart_history();
+  for (ArxChannel& channel : arx_) channel.restart_history();
+}
+
+void ResponseMonitor::sample_arx(Samples samples, TimePoint time) noexcept {
+  if (muted_ != Muted::kNo || !measured_.known || !setpoint_.known) return;
+  if (time - std::min(measured_.time, setpoint_.time) > params_.input_timeout) return;
+  SignalFrame signals;
+  signals[Signal::kRoll] = measured_.roll_rad;
+  signals[Signal::kPitch] = measured_.pitch_rad;
+  signals[Signal::kRollSetpoint] = setpoint_.roll_rad;
+  signals[Signal::kPitchSetpoint] = setpoint_.pitch_rad;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(params_.channel_count); ++i) {
+    if (params_.methods[i] != Method::kArx || params_.arx[i].samples != samples) continue;
+    arx_[i].sample(time, signals[params_.arx[i].input], signals[params_.arx[i].output]);
+  }
 }
 
 void ResponseMonitor::finish_tick(TimePoint now) noexcept {
@@ -115,8 +144,10 @@ void ResponseMonitor::finish_tick(TimePoint now) noexcept {
   const SignalFrame signals = frame(now);
   for (int i = 0; i < params_.channel_count; ++i) {
     const auto channel = static_cast<std::size_t>(i);
-    verdicts_[channel] =
-        channels_[channel].step(signals, to_seconds(elapsed), now, flown_, muted_ != Muted::kNo);
+    const bool silent = muted_ != Muted::kNo;
+    verdicts_[channel] = params_.methods[channel] == Method::kArx
+                             ? arx_[channel].step(now, flown_, silent)
+                             : channels_[channel].step(signals, to_seconds(elapsed), now, flown_, silent);
   }
 }
 

@@ -3,12 +3,16 @@
 #include <array>
 #include <span>
 
+#include "core/detectors/response/arx_channel.h"
 #include "core/detectors/response/response_channel.h"
 #include "core/estimators/attitude_propagator.h"
 
 namespace airworthy::response {
 
 inline constexpr int kMostChannels = 8;
+
+/// How a channel expects its response.
+enum class Method : std::uint8_t { kRegression, kArx };
 
 struct MonitorParams {
   Duration tick_period{100'000};      ///< the inertial samples of a period are averaged into one tick
@@ -17,6 +21,8 @@ struct MonitorParams {
   double min_groundspeed_m_s = 0;     ///< slower is not flying; 0 = not asked
   int channel_count = 0;
   std::array<ChannelParams, kMostChannels> channels{};
+  std::array<Method, kMostChannels> methods{};
+  std::array<ArxParams, kMostChannels> arx{};  ///< beside life cycle and warm-up of channels[i]
 };
 
 enum class MonitorState : std::uint8_t { kInitialising = 0, kConverging = 1, kMonitoring = 2, kMuted = 3 };
@@ -68,7 +74,7 @@ class ResponseMonitor {
   [[nodiscard]] std::int64_t gaps() const noexcept { return gaps_; }
 
  private:
-  struct Setpoint {
+  struct Angles {
     TimePoint time;
     double roll_rad;
     double pitch_rad;
@@ -77,15 +83,18 @@ class ResponseMonitor {
 
   void restart(TimePoint now) noexcept;
   void finish_tick(TimePoint now) noexcept;
+  void sample_arx(Samples samples, TimePoint time) noexcept;
   [[nodiscard]] SignalFrame frame(TimePoint now) const noexcept;
   [[nodiscard]] bool flying() const noexcept;
 
   MonitorParams params_;
   // optional<ResponseChannel> would do; default parameters make unused channels cheap instead.
   std::array<ResponseChannel, kMostChannels> channels_;
+  std::array<ArxChannel, kMostChannels> arx_;
   std::array<ChannelVerdict, kMostChannels> verdicts_{};
   AttitudePropagator<double> attitude_;
-  Setpoint setpoint_{};
+  Angles measured_{};  ///< the newest measured attitude, as it came
+  Angles setpoint_{};
   FlightState flight_state_{};
   bool flight_state_known_ = false;
 

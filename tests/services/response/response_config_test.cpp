@@ -80,6 +80,78 @@ colour = "red"
       "response.toml:16:1: channel[0].colour: unknown key");
 }
 
+TEST_F(ResponseConfigTest, TheFileOfThePublishedMethodIsValidAndSaysWhatWasPublished) {
+  const auto config = ResponseConfig::load(AIRWORTHY_SOURCE_DIR "/config/response_arx.toml", {});
+  ASSERT_TRUE(config) << config.error().text;
+  ASSERT_EQ(config->monitor.channel_count, 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(config->monitor.methods[i], Method::kArx);
+    const ArxParams& arx = config->monitor.arx[i];
+    EXPECT_EQ(arx.past_outputs, 25);
+    EXPECT_EQ(arx.past_inputs, 25);
+    EXPECT_EQ(arx.forgetting, 1.0);
+    EXPECT_EQ(arx.threshold_sigmas, 4.5);
+    EXPECT_EQ(arx.arm_after_samples, 200);
+    EXPECT_EQ(arx.samples, Samples::kEverySetpoint);
+    EXPECT_EQ(config->channels[i].unit, "rad");
+  }
+  EXPECT_EQ(config->monitor.arx[0].output, Signal::kRoll);
+  EXPECT_EQ(config->monitor.arx[0].input, Signal::kRollSetpoint);
+  EXPECT_EQ(config->monitor.arx[1].output, Signal::kPitch);
+  EXPECT_EQ(config->monitor.arx[1].input, Signal::kPitchSetpoint);
+}
+
+TEST_F(ResponseConfigTest, ProblemsOfAnArxChannel) {
+  EXPECT_EQ(error_of(R"(vehicle = "vehicle.toml"
+[[channel]]
+name = "roll"
+component = "roll control"
+fault_kind = "response_anomaly"
+severity = "warning"
+summary = "s"
+method = "arx"
+output = "accel_x_m_s2"
+input = "roll_rad"
+samples = "stale"
+past_outputs = 26
+forgetting = 1.5
+threshold_sigmas = 0.0
+drift_sigmas = 1.0
+[[channel]]
+name = "pitch"
+component = "pitch control"
+fault_kind = "response_anomaly"
+severity = "warning"
+summary = "s"
+method = "arx"
+output = "pitch_rad"
+input = "pitch_setpoint_rad"
+arm_after_samples = 40
+[[channel]]
+name = "thrust"
+component = "engine"
+fault_kind = "thrust_loss"
+severity = "warning"
+summary = "s"
+method = "neural"
+response = {signal = "accel_x_m_s2"}
+side = "low"
+terms = [{signal = "one"}]
+drift_sigmas = 1.0
+threshold = 8.0
+)"),
+            "response.toml:9:1: channel[0].output: must be one of roll_rad, pitch_rad, is \"accel_x_m_s2\"\n"
+            "response.toml:10:1: channel[0].input: must be one of roll_setpoint_rad, pitch_setpoint_rad, is "
+            "\"roll_rad\"\n"
+            "response.toml:11:1: channel[0].samples: must be one of every_setpoint, fresh, is \"stale\"\n"
+            "response.toml:12:1: channel[0].past_outputs: must lie in [0, 25], is 26\n"
+            "response.toml:13:1: channel[0].forgetting: must lie in [0.5, 1], is 1.5\n"
+            "response.toml:14:1: channel[0].threshold_sigmas: must lie in [0.5, 1000], is 0\n"
+            "response.toml:15:1: channel[0].drift_sigmas: unknown key\n"
+            "response.toml:25:1: channel[1].arm_after_samples: 40 samples cannot tell 51 coefficients apart\n"
+            "response.toml:32:1: channel[2].method: must be one of regression, arx, is \"neural\"");
+}
+
 TEST_F(ResponseConfigTest, WithoutChannelsThereIsNothingToDo) {
   EXPECT_EQ(error_of("vehicle = \"vehicle.toml\"\n"),
             "response.toml:1:1: channel: 0 channels; must be 1 to 8");
