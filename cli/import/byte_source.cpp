@@ -61,7 +61,7 @@ class XzSource final : public ByteSource {
     stream_.avail_out = buffer.size();
     while (stream_.avail_out != 0) {
       if (stream_.avail_in == 0 && !input_ended_) {
-        const auto count = file_->read(input_);
+        auto count = file_->read(input_);
         if (!count) return count;
         input_ended_ = *count == 0;
         stream_.next_in = reinterpret_cast<const std::uint8_t*>(input_.data());

@@ -11,6 +11,7 @@
 #include "cli/import/tlog.h"
 
 namespace airworthy::importer {
+namespace {
 
 Logs run_alfa(const Request& request) {
   std::vector<BatchItem> items;
@@ -57,6 +58,20 @@ Logs run_table(const Request& request) {
   auto log = import_table(input, *map, window, vehicle, request.output, line.of(input, 0, 1));
   if (!log) return tl::unexpected<rt::Error>{log.error()};
   return std::vector<LogSummary>{std::move(*log)};
+}
+
+}  // namespace
+
+Logs run(const Request& request) {
+  switch (request.kind) {
+    case Kind::kAlfa:
+      return run_alfa(request);
+    case Kind::kTlog:
+      return run_tlog(request);
+    case Kind::kTable:
+      break;
+  }
+  return run_table(request);
 }
 
 int report(const std::vector<LogSummary>& logs, const Request& request) {

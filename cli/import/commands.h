@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,8 +9,11 @@
 
 namespace airworthy::importer {
 
+enum class Kind : std::uint8_t { kAlfa, kTlog, kTable };
+
 /// The command line of one import, whatever its kind.
 struct Request {
+  Kind kind = Kind::kAlfa;
   std::vector<std::string> inputs;
   std::string output;
   std::string vehicle;  ///< empty: the default of the kind
@@ -23,9 +27,7 @@ struct Request {
 
 using Logs = rt::Expected<std::vector<LogSummary>>;
 
-[[nodiscard]] Logs run_alfa(const Request& request);
-[[nodiscard]] Logs run_tlog(const Request& request);
-[[nodiscard]] Logs run_table(const Request& request);
+[[nodiscard]] Logs run(const Request& request);
 
 /// Prints the summary on stdout and returns the exit code.
 [[nodiscard]] int report(const std::vector<LogSummary>& logs, const Request& request);

@@ -68,7 +68,7 @@ rt::Expected<void> CsvReader::read_header(const CsvFormat& format) {
   if (!*more) return rt::fail_with(fmt::format("{}: ends before the header", path_.string()));
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (line_text_.starts_with(kByteOrderMark)) line_text_.remove_prefix(kByteOrderMark.size());
-  if (const auto cells = split(); !cells) return cells;
+  if (auto cells = split(); !cells) return cells;
   header_ = cells_;
   for (auto& name : header_) name = trimmed(name);
   for (auto name = header_.begin(); name != header_.end(); ++name) {
@@ -147,7 +147,7 @@ rt::Expected<void> CsvReader::split() {
 }
 
 rt::Expected<bool> CsvReader::next() {
-  const auto more = next_line();
+  auto more = next_line();
   if (!more) return more;
   if (!*more) {
     if (!has_row_) return rt::fail_with(fmt::format("{}: has a header but no rows", path_.string()));

@@ -23,7 +23,7 @@ struct CsvFormat {
 /// regard to the locale. Every error names file and line.
 class CsvReader {
  public:
-  static constexpr std::size_t kLongestLine = 1024 * 1024;
+  static constexpr std::size_t kLongestLine = std::size_t{1024} * 1024;
 
   [[nodiscard]] static rt::Expected<CsvReader> open(const std::filesystem::path& path,
                                                     const CsvFormat& format = {});

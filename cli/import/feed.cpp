@@ -54,7 +54,7 @@ rt::Expected<void> merge(std::vector<std::unique_ptr<Feed>>& feeds, std::vector<
   auto truth = truths.begin();
   for (int messages = 0; !live.empty(); ++messages) {
     if (messages % kMessagesPerReport == 0) {
-      if (const auto reported = progress(done_ratio(feeds)); !reported) return reported;
+      if (auto reported = progress(done_ratio(feeds)); !reported) return reported;
     }
     const auto first = std::min_element(live.begin(), live.end(), earlier);
     for (; truth != truths.end() && *truth->time <= (*first)->time(); ++truth) {

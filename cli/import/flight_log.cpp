@@ -45,6 +45,11 @@ void FlightLog::move_to(TimePoint time) {
 }
 
 rt::Expected<LogSummary> FlightLog::commit() {
+  const auto truths = writer_->messages().find(node_.full_name(channel::kGroundTruth.info));
+  const std::size_t truth_channels = truths == writer_->messages().end() ? 0 : 1;
+  if (writer_->messages().size() == truth_channels) {
+    return rt::fail_with(path_ + ": not written: nothing in the input became a message");
+  }
   if (const auto committed = writer_->commit(); !committed)
     return tl::unexpected<rt::Error>{committed.error()};
   return LogSummary{

@@ -55,7 +55,8 @@ class FlightLog {
   /// Counts input that is not imported.
   void leave_out(const std::string& reason) { ++left_out_[reason]; }
 
-  /// Gives the log its name; before this, or after a failure, there is none.
+  /// Gives the log its name; before this, or after a failure, there is none. A log without a message other
+  /// than truth is a failure.
   [[nodiscard]] rt::Expected<LogSummary> commit();
 
  private:

@@ -1,63 +1,13 @@
 #include <sysexits.h>
 
-#include <CLI/CLI.hpp>
-
-#include "cli/import/commands.h"
-#include "runtime/config/vehicle.h"
+#include "cli/import/command_line.h"
 #include "runtime/process/exit.h"
 
 int main(int argc, char** argv) {
   using namespace airworthy;
-  CLI::App app{
-      "Turns recorded flights of other kinds into LCM logs.\n"
-      "Exit code 0: done; 64: wrong arguments; 65: input or output that is not as it should be.",
-      "airworthy import"};
-  app.set_version_flag("--version", AIRWORTHY_VERSION);
-  app.require_subcommand(1);
-  importer::Request request;
-  const auto vehicle_name = [](const std::string& name) {
-    return rt::VehicleFile::is_valid_name(name) ? std::string{}
-                                                : std::string{"must be 1 to 16 of A-Z a-z 0-9 _ -"};
-  };
-  const auto common = [&](CLI::App* command, const char* default_vehicle) {
-    command
-        ->add_option("--vehicle", request.vehicle,
-                     std::string{"vehicle's name in the log; default "} + default_vehicle)
-        ->check(vehicle_name);
-    command->add_flag("--json", request.json, "print the summary as a JSON object");
-  };
-
-  CLI::App* alfa = app.add_subcommand("alfa", "sequences of the ALFA data set, a folder of CSV files each");
-  alfa->add_option("DIR", request.inputs, "folder of one sequence")->required();
-  alfa->add_option("-o,--output", request.output, "folder for the logs, <sequence>.lcm each")->required();
-  common(alfa, "alfa");
-
-  CLI::App* tlog = app.add_subcommand("tlog", "MAVLink telemetry logs of a ground station");
-  tlog->add_option("FILE", request.inputs, ".tlog or .tlog.xz")->required();
-  tlog->add_option("-o,--output", request.output, "folder for the logs, <name>.lcm each")->required();
-  tlog->add_option("--truth", request.truth, "CSV file with columns sequence, fault, fault_onset_ns");
-  tlog->add_option("--config", request.config,
-                   "configuration of airworthy-mavlink, such as config/mavlink.toml");
-  common(tlog, "mavlink, or that of --config");
-
-  CLI::App* table = app.add_subcommand("table", "a CSV file, or a folder of them, by a mapping file");
-  table->add_option("FILE", request.inputs, "CSV file, or folder where the map names several")
-      ->required()
-      ->expected(1);
-  table->add_option("--map", request.map, "mapping file, such as those in config/import")->required();
-  table->add_option("-o,--output", request.output, "log to write")->required();
-  table->add_option("--from", request.from_s, "first moment to import, s of vehicle time");
-  table->add_option("--until", request.until_s, "last moment to import, s of vehicle time");
-  common(table, "that of the map");
-
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+  const auto request = importer::parse_command_line(argc, argv);
+  if (!request) return request.error();
   importer::stop_on_signals();
-  const auto logs = alfa->parsed()   ? importer::run_alfa(request)
-                    : tlog->parsed() ? importer::run_tlog(request)
-                                     : importer::run_table(request);
-  return logs ? importer::report(*logs, request) : rt::fail(EX_DATAERR, logs.error());
+  const auto logs = importer::run(*request);
+  return logs ? importer::report(*logs, *request) : rt::fail(EX_DATAERR, logs.error());
 }

@@ -149,7 +149,7 @@ class TableFeed final : public Feed {
 
   rt::Expected<bool> next() override {
     for (;;) {
-      const auto more = topic_.next();
+      auto more = topic_.next();
       if (!more || !*more) return more;
       if (window_.until && topic_.time() > *window_.until) continue;
       if (!window_.from || topic_.time() >= *window_.from) return true;

@@ -91,7 +91,7 @@ MessageMap read_message(ConfigTable table) {
     table.fail("channel", fmt::format("must be one of {}", fmt::join(MessageBuilder::channels(), ", ")));
     return message;
   }
-  for (ConfigTable field : table.tables("fields", {"field", rt::Count::at_least(1)})) {
+  for (const ConfigTable& field : table.tables("fields", {"field", rt::Count::at_least(1)})) {
     read_field(field, *builder, message);
   }
   message.only_on_change = table.optional<std::vector<std::string>>("only_on_change", {});
@@ -103,7 +103,7 @@ TableMap read_table(ConfigTable table) {
   map.path = table.optional<std::string>("path", "");
   map.format = read_format(table);
   map.time = read_time(table.required_table("time"));
-  for (ConfigTable message : table.tables("message", {{}, rt::Count::at_least(1)})) {
+  for (const ConfigTable& message : table.tables("message", {{}, rt::Count::at_least(1)})) {
     map.messages.push_back(read_message(message));
   }
   return map;
@@ -192,16 +192,16 @@ rt::Expected<ImportMap> ImportMap::load(const std::filesystem::path& path) {
   if (!rt::VehicleFile::is_valid_name(map.vehicle)) {
     root.fail("vehicle", fmt::format("must be 1 to {} of A-Z a-z 0-9 _ -", rt::VehicleFile::kMaxNameLength));
   }
-  for (ConfigTable table : root.tables("table", {{}, rt::Count::at_least(1)}))
+  for (const ConfigTable& table : root.tables("table", {{}, rt::Count::at_least(1)}))
     map.tables.push_back(read_table(table));
   const auto is_file_itself = [](const TableMap& table) { return table.path.empty(); };
   if (map.tables.size() > 1 && std::any_of(map.tables.begin(), map.tables.end(), is_file_itself)) {
     root.fail("table", "several tables need a path each, in the folder that is imported");
   }
-  for (ConfigTable gate : root.tables("gate", {"name"})) map.gates.push_back(read_gate(gate));
-  for (ConfigTable truth : root.tables("truth")) map.truths.push_back(read_fixed_truth(truth));
+  for (const ConfigTable& gate : root.tables("gate", {"name"})) map.gates.push_back(read_gate(gate));
+  for (const ConfigTable& truth : root.tables("truth")) map.truths.push_back(read_fixed_truth(truth));
   if (auto index = root.optional_table("truth_index")) map.truth_index = read_truth_index(*index);
-  for (ConfigTable setting : root.tables("truth_setting"))
+  for (const ConfigTable& setting : root.tables("truth_setting"))
     map.truth_settings.push_back(read_truth_setting(setting));
   return file.finish(std::move(map));
 }

@@ -60,7 +60,7 @@ rt::Expected<Topic> Topic::open(CsvReader reader, const TimeColumn& time,
 }
 
 rt::Expected<bool> Topic::next() {
-  const auto more = reader_.next();
+  auto more = reader_.next();
   if (!more || !*more) return more;
   const auto time = time_column_.read(reader_, time_index_);
   if (!time) return tl::unexpected<rt::Error>{time.error()};

@@ -216,6 +216,15 @@ TEST_F(TableTest, ImportsAWindowWithTheFaultsThatConcernIt) {
   EXPECT_EQ(found[0].onset_us, 3'000'000);
 }
 
+TEST_F(TableTest, AnImportOfNothingIsAnError) {
+  write("flight.csv", "t,x,y,z\n1,0,0,0\n");
+  const std::string map = std::string{kMap} + "[[truth]]\nfault_kind = \"none\"\n";
+  const auto summary = import(map, "flight.csv", {from_us(2'000'000), {}});
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().text, log_.string() + ": not written: nothing in the input became a message");
+  EXPECT_EQ(names_in(folder_.path()), (std::vector<std::string>{"flight.csv", "map.toml"}));
+}
+
 TEST_F(TableTest, TruthCountsFromTheFirstRow) {
   write("flight.csv", "t,x,y,z\n100,0,0,0\n101,0,0,0\n102,0,0,0\n");
   ASSERT_TRUE(import(
