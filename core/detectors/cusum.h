@@ -12,10 +12,11 @@ struct CusumParams {
 };
 
 /// Cumulative sum of evidence for a change.
-///   S ← max(0, S + g), alarm at S ≥ h (1) Source     E. S. Page, Continuous inspection schemes, Biometrika
-///   41 (1954) Symbols    g: log-likelihood ratio of one sample, or a robust stand-in, negative in the mean
-///   without a change Onset      the last sample at which S was 0: the maximum-likelihood start of the change
-///   for (1)
+///   S ← max(0, S + g), alarm at S ≥ h                                                                (1)
+///   Source     E. S. Page, Continuous inspection schemes, Biometrika 41 (1954)
+///   Symbols    g: log-likelihood ratio of one sample, or a robust stand-in, negative in the mean without a
+///              change
+///   Onset      the last sample at which S was 0: the maximum-likelihood start of the change for (1)
 class Cusum {
  public:
   explicit Cusum(const CusumParams& params) noexcept : params_{params} {}

@@ -7,10 +7,11 @@
 namespace airworthy {
 
 /// Roll and pitch between slow attitude samples, carried on by the gyro.
-///   φ̇ = p + tan θ·(q·sin φ + r·cos φ);  θ̇ = q·cos φ − r·sin φ (1) Source     kinematics of the z-y-x Euler
-///   angles Frames     body x forward, y right, z down; rad, rad/s Approximations  explicit Euler step over
-///   the mean of two rate samples: at 10 Hz and 1 rad/s the error of one
-///              step is below 5 mrad, and it is reset by the next attitude sample
+///   φ̇ = p + tan θ·(q·sin φ + r·cos φ);  θ̇ = q·cos φ − r·sin φ                                     (1)
+///   Source     kinematics of the z-y-x Euler angles
+///   Frames     body x forward, y right, z down; rad, rad/s
+///   Approximations  explicit Euler step over the mean of two rate samples: at 10 Hz and 1 rad/s the error of
+///              one step is below 5 mrad, and it is reset by the next attitude sample
 ///   Valid for  |θ| < 80°; beyond, tan θ is held at its value there
 template <class Scalar>
 class AttitudePropagator {

@@ -23,14 +23,15 @@ struct DelayedRegressionParams {
 
 /// Linear regression learned in flight, on samples D ticks old, so that a fault younger than D ticks is not
 /// absorbed into the model that is to expose it.
-///   Model      y = xᵀθ + e,  e heavy-tailed with scale σ (1) Learning   w = min(1, c·σ/|yⱼ − xⱼᵀθ|);  A ← A
-///   + w·xⱼxⱼᵀ;  b ← b + w·yⱼxⱼ,  j = k − D                     (2) Refit      P = (A + ρ·diag(max(Aᵢᵢ/n,
-///   10⁻⁶)))⁻¹;  θ = P·b                                                 (3) Prediction e = y − xᵀθ;  s =
-///   σ·√(1 + κ·xᵀP·x)                                                              (4) Scale      first σ
-///   = 1.4826·median|eⱼ|; then σ² ← σ² + a·(1.1·min(|eⱼ|, 2.5σ)² − σ²), a = max(1/M, 1/m)     (5) Symbols D
-///   delay_ticks, c huber_sigmas, ρ ridge, κ extrapolation_gain, M scale_memory Source     weighted least
-///   squares with Huber's weights; derivation in docs/equations/response.md Valid for  terms ≤ kMaxTerms,
-///   delay_ticks < kMaxDelay; no heap; n³ flops per refit, n² per tick
+///   Model      y = xᵀθ + e,  e heavy-tailed with scale σ                                              (1)
+///   Learning   w = min(1, c·σ/|yⱼ − xⱼᵀθ|);  A ← A + w·xⱼxⱼᵀ;  b ← b + w·yⱼxⱼ,  j = k − D             (2)
+///   Refit      P = (A + ρ·diag(max(Aᵢᵢ/n, 10⁻⁶)))⁻¹;  θ = P·b                                         (3)
+///   Prediction e = y − xᵀθ;  s = σ·√(1 + κ·xᵀP·x)                                                     (4)
+///   Scale      first σ = 1.4826·median|eⱼ|;
+///              then σ² ← σ² + a·(1.1·min(|eⱼ|, 2.5σ)² − σ²), a = max(1/M, 1/m)                        (5)
+///   Symbols    D delay_ticks, c huber_sigmas, ρ ridge, κ extrapolation_gain, M scale_memory
+///   Source     weighted least squares with Huber's weights; derivation in docs/equations/response.md
+///   Valid for  terms ≤ kMaxTerms, delay_ticks < kMaxDelay; no heap; n³ flops per refit, n² per tick
 template <class Scalar, int kMaxTerms, int kMaxDelay>
 class DelayedRegression {
  public:

@@ -20,8 +20,8 @@ TEST(GatewayConfig, TheShippedFileHoldsTheDefaults) {
   const auto config = GatewayConfig::load(kShipped, {});
   ASSERT_TRUE(config) << config.error().text;
   const health::HealthConfig defaults;
-  EXPECT_EQ(config->vehicle, "quad1");
-  EXPECT_EQ(config->health.vehicle, "quad1");
+  EXPECT_EQ(config->vehicle, "plane1");
+  EXPECT_EQ(config->health.vehicle, "plane1");
   EXPECT_EQ(config->feed.endpoint, FeedConfig{}.endpoint);
   EXPECT_EQ(config->feed.high_water_mark, FeedConfig{}.high_water_mark);
   EXPECT_EQ(config->feed.linger_ms, FeedConfig{}.linger_ms);

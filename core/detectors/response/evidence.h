@@ -22,17 +22,17 @@ struct EvidenceParams {
 };
 
 /// Evidence of one tick that the response shifted upwards (for downwards: give −z).
-///   g = clip(z, ±c) − k₀ (1) Valid for  z = e/s, the normalised innovation; negative in the mean while E[z]
-///   < k₀
+///   g = clip(z, ±c) − k₀                                                                             (1)
+///   Valid for  z = e/s, the normalised innovation; negative in the mean while E[z] < k₀
 [[nodiscard]] inline double shift_evidence(const EvidenceParams& params, double z) noexcept {
   return std::clamp(z, -params.clip_sigmas, params.clip_sigmas) - params.drift_sigmas;
 }
 
 /// Evidence of one tick that only the part γ of the commanded response is left: the log-likelihood ratio of
 /// e ~ N(−(1−γ)û, s′²) against e ~ N(0, s′²), made robust by two clips.
-///   v = (1−γ)·û/s′;  g = clip(−v·clip(e/s′, ±c) − v²/2, ±g_max) (2) Symbols    û commanded part of the
-///   expected response, e innovation, s′ = sigma_inflation·s Without a command v = 0 and g = 0: no
-///   excitation, no evidence, so there is no separate gate.
+///   v = (1−γ)·û/s′;  g = clip(−v·clip(e/s′, ±c) − v²/2, ±g_max)                                      (2)
+///   Symbols    û commanded part of the expected response, e innovation, s′ = sigma_inflation·s
+///   Without a command v = 0 and g = 0: no excitation, no evidence, so there is no separate gate.
 [[nodiscard]] inline double gain_loss_evidence(const EvidenceParams& params, double innovation,
                                                double commanded, double sigma) noexcept {
   const double s = params.sigma_inflation * sigma;

@@ -51,8 +51,8 @@ bool ResponseMonitor::on_imu(const ImuSample& sample) noexcept {
   }
   ++averaged_;
   typical_interval_ += (interval - typical_interval_) / kIntervalMemory;
-  // The sample nearest to the end of the period completes it, whatever the rate of the inertial unit. At about one
-  // sample a period each is a tick of its own, however it jitters.
+  // The sample nearest to the end of the period completes it, whatever the rate of the inertial unit. At
+  // about one sample a period each is a tick of its own, however it jitters.
   if (sample.time + typical_interval_ / 2 < tick_time_ + params_.tick_period) return false;
   finish_tick(sample.time);
   return true;
