@@ -139,7 +139,7 @@ class Replay(SystemTest):
         with open(system_test.DATA / "mavlink_ref/crc_extra.csv", encoding="utf-8") as file:
             names = {row["msgid"]: row["name"] for row in csv.DictReader(file)}
         self.assertEqual(counted, {names[message]: count for message, count in summary["per_message"].items()})
-        self.assertEqual(counters["crc_errors"], 0)
+        self.assertEqual(counters["parser.crc_errors"], 0)
 
 
 if __name__ == "__main__":
