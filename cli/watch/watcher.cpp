@@ -38,7 +38,7 @@ std::vector<std::string> Watcher::add(const FeedMessage& message, Time now) {
     for (std::string& line : changes_.add(*health_)) lines.push_back(std::move(line));
   }
   if (!health_ || health_->utc.empty()) return lines;
-  for (std::string& line : lines) line = health_->utc + " " + line;
+  for (std::string& line : lines) line.insert(0, health_->utc + " ");
   return lines;
 }
 
