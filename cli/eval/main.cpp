@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cstdio>
+#include <exception>
 #include <optional>
 #include <string>
 #include <thread>
@@ -29,9 +31,7 @@ std::vector<std::optional<rt::Expected<eval::Flight>>> run_all(const std::vector
   return workers.clear(), flights;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app{
       "Runs the configured detectors over recorded flights, on message time, and scores them against the "
       "truth "
@@ -68,4 +68,15 @@ int main(int argc, char** argv) {
   }
   fmt::print("{}", json ? eval::to_json(evaluation) : eval::to_table(evaluation));
   return failures;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {  // memory or threads ran out
+    std::fprintf(stderr, "airworthy-eval: %s\n", error.what());
+    return EX_OSERR;
+  }
 }
