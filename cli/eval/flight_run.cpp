@@ -28,7 +28,8 @@ class TickSource {
 
 }  // namespace
 
-rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseConfig config) {
+rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseConfig config,
+                                TickObserver observer) {
   const auto contents = rt::LogBus::survey(log_path);
   if (!contents) return tl::unexpected{contents.error()};
   auto bus = rt::LogBus::open(log_path);
@@ -36,6 +37,7 @@ rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseC
 
   Flight flight;
   flight.name = std::filesystem::path{log_path}.stem().string();
+  flight.vehicle = contents->vehicle;
   rt::ManualClock clock;
   rt::Log log{"airworthy-eval", rt::LogLevel::kError};
   rt::Node node{**bus, clock, log, {contents->vehicle, "airworthy-eval", 1}};
@@ -61,7 +63,8 @@ rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseC
 
   config.vehicle = contents->vehicle;
   rt::Node detector_node{**bus, clock, log, {contents->vehicle, "airworthy-response", 1}};
-  const response::ResponseService service{detector_node, config};
+  response::ResponseService service{detector_node, config};
+  if (observer) service.observe_ticks(std::move(observer));
   std::optional<TickSource> ticks;
   if (!contents->has(node.full_name(channel::kTick.info))) ticks.emplace(node);
 

@@ -26,6 +26,7 @@ struct Truth {
 /// One flight as the detectors saw it.
 struct Flight {
   std::string name;
+  std::string vehicle;
   std::optional<Truth> truth;  ///< empty = not known: shown, never scored
   TimePoint start;
   TimePoint end;

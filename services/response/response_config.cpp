@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/config/vehicle.h"
+#include "services/response/calibration.h"
 
 namespace airworthy::response {
 namespace {
@@ -187,16 +188,40 @@ ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
   } else if (std::count(params.commanded.begin(), params.commanded.end(), true) == 0) {
     table.fail("terms", "a gain_loss channel needs at least one term with commanded = true");
   }
+  if (params.evidence.alternative == Alternative::kShift) {
+    params.warm_drift_sigmas =
+        table.optional<double>("warm_drift_sigmas", params.evidence.drift_sigmas, Range{0.0, 10.0});
+    if (params.evidence.clip_sigmas <= params.warm_drift_sigmas) {
+      table.fail("clip_sigmas",
+                 fmt::format("{} must exceed warm_drift_sigmas ({})", params.evidence.clip_sigmas,
+                             params.warm_drift_sigmas),
+                 {"warm_drift_sigmas", "drift_sigmas"});
+    }
+  }
   params.regression = read_regression(table, params.term_count, tick_s);
   params.cusum = read_cusum(table);
   params.life_cycle = read_life_cycle(table);
   return params;
 }
 
-}  // namespace
+void read_calibration(ConfigTable root, bool cold, ResponseConfig& config) {
+  const auto path = root.required_path("calibration");
+  if (path.empty() || cold) return;
+  const auto calibration = load_calibration(path);
+  if (!calibration) return root.fail_in_other_file(calibration.error());
+  root.record("calibration.hash", calibration->hash);
+  if (calibration->vehicle != config.vehicle) {
+    return root.fail("calibration",
+                     fmt::format("is of vehicle \"{}\", not of \"{}\"", calibration->vehicle, config.vehicle),
+                     {"vehicle"});
+  }
+  auto monitor = with_calibration(config.monitor, config.channel_names(), *calibration);
+  if (!monitor) return root.fail("calibration", monitor.error().text, {"channel"});
+  config.monitor = *monitor;
+}
 
-rt::Expected<ResponseConfig> ResponseConfig::load(const std::string& path,
-                                                  const std::vector<std::string>& overrides) {
+rt::Expected<ResponseConfig> load_from(const std::string& path, const std::vector<std::string>& overrides,
+                                       bool cold) {
   auto file = rt::ConfigFile::load(path, overrides);
   ConfigTable root = file.root();
   ResponseConfig config;
@@ -232,8 +257,27 @@ rt::Expected<ResponseConfig> ResponseConfig::load(const std::string& path,
       config.channels.push_back(read_meaning(table, params.response.signal));
     }
   }
+  if (root.has("calibration")) read_calibration(root, cold, config);
   config.hash = file.hash();
   return file.finish(std::move(config));
+}
+
+}  // namespace
+
+std::vector<std::string> ResponseConfig::channel_names() const {
+  std::vector<std::string> names;
+  for (const ChannelMeaning& channel : channels) names.push_back(channel.name);
+  return names;
+}
+
+rt::Expected<ResponseConfig> ResponseConfig::load(const std::string& path,
+                                                  const std::vector<std::string>& overrides) {
+  return load_from(path, overrides, false);
+}
+
+rt::Expected<ResponseConfig> ResponseConfig::load_cold(const std::string& path,
+                                                       const std::vector<std::string>& overrides) {
+  return load_from(path, overrides, true);
 }
 
 }  // namespace airworthy::response

@@ -29,8 +29,14 @@ struct ResponseConfig {
   MonitorParams monitor;
   std::vector<ChannelMeaning> channels;  ///< in the order of monitor.channels
 
+  [[nodiscard]] std::vector<std::string> channel_names() const;
+
+  /// With a key `calibration` the monitor starts warm, from that file; see services/response/calibration.h.
   [[nodiscard]] static rt::Expected<ResponseConfig> load(const std::string& path,
                                                          const std::vector<std::string>& overrides);
+  /// The same without opening the calibration, which may yet have to be learned.
+  [[nodiscard]] static rt::Expected<ResponseConfig> load_cold(const std::string& path,
+                                                              const std::vector<std::string>& overrides);
 };
 
 }  // namespace airworthy::response

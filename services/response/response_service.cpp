@@ -85,6 +85,7 @@ void ResponseService::on_imu(const imu_t& message) {
     sample.gyro_rad_s[axis] = message.gyro_rad_s[axis];
   }
   if (!monitor_.on_imu(sample)) return;
+  if (observer_) observer_(monitor_);
   const auto verdicts = monitor_.verdicts();
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i].transition != Transition::kNone) handle_verdict(i, verdicts[i]);
@@ -177,6 +178,7 @@ void ResponseService::publish_status() {
   status.recent_count = static_cast<std::int32_t>(status.recent.size());
   node_.counters()["samples_refused"] = monitor_.refused_samples();
   node_.counters()["input_gaps"] = monitor_.gaps();
+  node_.counters()["priors_refused"] = monitor_.refused_priors();
   status.counters = node_.counters().to_messages();
   status.counter_count = static_cast<std::int32_t>(status.counters.size());
   status_.publish(status, node_.clock().now());

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <deque>
+#include <functional>
 #include <optional>
 
 #include "airworthy/attitude_setpoint_t.hpp"
@@ -23,6 +24,12 @@ class ResponseService {
   static constexpr std::size_t kRecentEvents = 32;
 
   ResponseService(rt::Node& node, const ResponseConfig& config);
+
+  /// Shows the monitor after each of its ticks, to learn from a recorded flight.
+  void observe_ticks(std::function<void(const ResponseMonitor&)> observer) {
+    observer_ = std::move(observer);
+  }
+
   ResponseService(const ResponseService&) = delete;
   ResponseService& operator=(const ResponseService&) = delete;
 
@@ -42,6 +49,7 @@ class ResponseService {
   std::array<std::optional<fault_event_t>, kMostChannels> active_;
   std::deque<fault_event_t> recent_;
   std::int64_t next_number_ = 1;
+  std::function<void(const ResponseMonitor&)> observer_;
 };
 
 }  // namespace airworthy::response

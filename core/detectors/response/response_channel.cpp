@@ -8,6 +8,7 @@ ResponseChannel::ResponseChannel(const ChannelParams& params) noexcept
     : params_{params},
       response_{params.response},
       regression_{params.regression},
+      x_{BoundedVector<double, kMostTerms>::Zero(params.term_count)},
       low_{params.cusum},
       high_{params.cusum},
       life_cycle_{params.life_cycle} {
@@ -18,9 +19,9 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
                                      bool muted) noexcept {
   ChannelVerdict verdict;
   verdict.observed = response_.step(frame, tick_s);
-  auto x = decltype(regression_)::Vector{params_.term_count};
+  const auto& x = x_;
   for (int i = 0; i < params_.term_count; ++i) {
-    x(i) = regressors_[static_cast<std::size_t>(i)].step(frame, tick_s);
+    x_(i) = regressors_[static_cast<std::size_t>(i)].step(frame, tick_s);
   }
 
   decltype(regression_)::Prediction prediction;
@@ -62,6 +63,25 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
     verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
   }
   return verdict;
+}
+
+bool ResponseChannel::warm_start(const ChannelPrior& prior) noexcept {
+  using Regression = decltype(regression_);
+  auto theta = Regression::Vector{params_.term_count};
+  auto gram = Regression::Matrix{params_.term_count, params_.term_count};
+  for (int i = 0; i < params_.term_count; ++i) {
+    theta(i) = prior.theta[static_cast<std::size_t>(i)];
+    for (int j = 0; j < params_.term_count; ++j) {
+      gram(i, j) = prior.gram[static_cast<std::size_t>(i * params_.term_count + j)];
+    }
+  }
+  if (!(prior.threshold > 0)) return false;
+  if (!regression_.warm_start(theta, gram, prior.sigma, prior.worth_samples)) return false;
+  params_.evidence.drift_sigmas = params_.warm_drift_sigmas;
+  params_.cusum.threshold = prior.threshold;
+  low_ = Cusum{params_.cusum};
+  high_ = Cusum{params_.cusum};
+  return warm_ = true;
 }
 
 void ResponseChannel::restart_history() noexcept {

@@ -4,6 +4,7 @@
 
 #include "core/detectors/cusum.h"
 #include "core/detectors/fault_life_cycle.h"
+#include "core/detectors/response/channel_prior.h"
 #include "core/detectors/response/channel_verdict.h"
 #include "core/detectors/response/evidence.h"
 #include "core/detectors/response/regressor.h"
@@ -11,7 +12,6 @@
 
 namespace airworthy::response {
 
-inline constexpr int kMostTerms = 12;
 inline constexpr int kMostLearningDelayTicks = 128;
 
 /// Which deviation of the response is a fault.
@@ -24,6 +24,7 @@ struct ChannelParams {
   std::array<bool, kMostTerms> commanded{};  ///< gain loss: these terms make up the commanded response û
   Side side = Side::kBoth;                   ///< shift: which deviation is a fault
   EvidenceParams evidence;
+  double warm_drift_sigmas = 1.75;  ///< shift: k₀ in place of evidence.drift_sigmas after a warm start
   DelayedRegressionParams regression;
   CusumParams cusum;
   FaultLifeCycleParams life_cycle;
@@ -41,10 +42,19 @@ class ResponseChannel {
   ChannelVerdict step(const SignalFrame& frame, double tick_s, TimePoint now, Duration flown,
                       bool muted) noexcept;
 
+  /// From now on expects, tests and alarms by what earlier flights say, until this flight says more. False
+  /// where the prior does not fit the channel or is no prior: nothing changes then.
+  [[nodiscard]] bool warm_start(const ChannelPrior& prior) noexcept;
+
   /// After a gap in the input: delays and unlearned samples are dropped, what was learned stays.
   void restart_history() noexcept;
 
   [[nodiscard]] bool fault_active() const noexcept { return life_cycle_.active(); }
+  [[nodiscard]] bool warm() const noexcept { return warm_; }
+  [[nodiscard]] double threshold() const noexcept { return params_.cusum.threshold; }
+
+  /// x of the newest tick, in the order of the terms; NaN where not known.
+  [[nodiscard]] const BoundedVector<double, kMostTerms>& regressors() const noexcept { return x_; }
 
  private:
   void accumulate(const ChannelVerdict& verdict, TimePoint now) noexcept;
@@ -54,6 +64,8 @@ class ResponseChannel {
   Regressor response_;
   std::array<Regressor, kMostTerms> regressors_;
   DelayedRegression<double, kMostTerms, kMostLearningDelayTicks> regression_;
+  BoundedVector<double, kMostTerms> x_;
+  bool warm_ = false;
   Cusum low_;   ///< evidence of a downward shift, or of a lost gain
   Cusum high_;  ///< evidence of an upward shift
   FaultLifeCycle life_cycle_;

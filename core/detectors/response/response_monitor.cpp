@@ -141,6 +141,7 @@ void ResponseMonitor::finish_tick(TimePoint now) noexcept {
 
   muted_ = flying() ? Muted::kNo : Muted::kNotFlying;
   if (muted_ == Muted::kNo) flown_ += elapsed;
+  choose_configuration();
   const SignalFrame signals = frame(now);
   for (int i = 0; i < params_.channel_count; ++i) {
     const auto channel = static_cast<std::size_t>(i);
@@ -148,6 +149,22 @@ void ResponseMonitor::finish_tick(TimePoint now) noexcept {
     verdicts_[channel] = params_.methods[channel] == Method::kArx
                              ? arx_[channel].step(now, flown_, silent)
                              : channels_[channel].step(signals, to_seconds(elapsed), now, flown_, silent);
+  }
+}
+
+void ResponseMonitor::choose_configuration() noexcept {
+  if (configured_ || muted_ != Muted::kNo) return;
+  if (flight_state_known_ && flight_state_.airspeed_m_s > params_.airspeed_sensor_above_m_s) {
+    airspeed_sensor_ = true;
+  }
+  if (flown_ < params_.configuration_after) return;
+  configured_ = true;
+  for (int c = 0; c < params_.configuration_count; ++c) {
+    const VehicleConfiguration& configuration = params_.configurations[static_cast<std::size_t>(c)];
+    if (configuration.airspeed_sensor != airspeed_sensor_) continue;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(params_.channel_count); ++i) {
+      if (configuration.priors[i] && !channels_[i].warm_start(*configuration.priors[i])) ++refused_priors_;
+    }
   }
 }
 

@@ -9,8 +9,6 @@
 
 namespace airworthy::response {
 
-inline constexpr int kMostChannels = 8;
-
 /// How a channel expects its response.
 enum class Method : std::uint8_t { kRegression, kArx };
 
@@ -23,6 +21,10 @@ struct MonitorParams {
   std::array<ChannelParams, kMostChannels> channels{};
   std::array<Method, kMostChannels> methods{};
   std::array<ArxParams, kMostChannels> arx{};  ///< beside life cycle and warm-up of channels[i]
+  int configuration_count = 0;                 ///< 0: a cold start, everything is learned in this flight
+  std::array<VehicleConfiguration, kMostConfigurations> configurations{};
+  Duration configuration_after{5'000'000};  ///< so much flight tells which configuration this is
+  double airspeed_sensor_above_m_s = 3.0;   ///< an airspeed sensor that works reads more than this in flight
 };
 
 enum class MonitorState : std::uint8_t { kInitialising = 0, kConverging = 1, kMonitoring = 2, kMuted = 3 };
@@ -70,6 +72,13 @@ class ResponseMonitor {
   [[nodiscard]] std::span<const ChannelVerdict> verdicts() const noexcept {
     return {verdicts_.data(), static_cast<std::size_t>(params_.channel_count)};
   }
+  [[nodiscard]] const ResponseChannel& channel(int index) const noexcept {
+    return channels_[static_cast<std::size_t>(index)];
+  }
+  /// Seen in this flight; known once `configuration_after` has been flown.
+  [[nodiscard]] bool airspeed_sensor() const noexcept { return airspeed_sensor_; }
+  /// Priors that were refused because they do not fit their channel.
+  [[nodiscard]] std::int64_t refused_priors() const noexcept { return refused_priors_; }
   [[nodiscard]] std::int64_t refused_samples() const noexcept { return refused_samples_; }
   [[nodiscard]] std::int64_t gaps() const noexcept { return gaps_; }
 
@@ -83,6 +92,7 @@ class ResponseMonitor {
 
   void restart(TimePoint now) noexcept;
   void finish_tick(TimePoint now) noexcept;
+  void choose_configuration() noexcept;
   void sample_arx(Samples samples, TimePoint time) noexcept;
   [[nodiscard]] SignalFrame frame(TimePoint now) const noexcept;
   [[nodiscard]] bool flying() const noexcept;
@@ -110,6 +120,9 @@ class ResponseMonitor {
   Duration flown_{0};
   Muted muted_ = Muted::kNo;
   bool silent_ = false;
+  bool airspeed_sensor_ = false;
+  bool configured_ = false;
+  std::int64_t refused_priors_ = 0;
   std::int64_t refused_samples_ = 0;
   std::int64_t gaps_ = 0;
 };

@@ -132,5 +132,38 @@ TEST_F(DelayedRegressionTest, UsesNoHeap) {
   EXPECT_EQ(guard.allocations(), 0U);
 }
 
+TEST_F(DelayedRegressionTest, AWarmStartPredictsAtOnceAndGivesWayToTheFlight) {
+  Vector theta(3);
+  theta << 2.0, -1.0, 3.5;  // the constant of this flight is 0.5
+  ASSERT_TRUE(regression_.warm_start(theta, Regression::Matrix::Identity(3, 3), kNoise, 300));
+  Vector x(3);
+  x << 1.0, 1.0, 1.0;
+  EXPECT_EQ(regression_.update(x, 4.5, prediction_), UpdateStatus::kFused);
+  EXPECT_NEAR(prediction_.expected, 4.5, 0.01);
+  EXPECT_GT(prediction_.sigma, kNoise);
+  EXPECT_LT(prediction_.sigma, 1.2 * kNoise);
+  feed(300);  // as many samples as the prior is worth: half way
+  EXPECT_NEAR(regression_.theta()(2), 2.0, 0.5);
+  feed(20000);
+  EXPECT_NEAR(regression_.theta()(2), 0.5, 0.1);
+}
+
+TEST_F(DelayedRegressionTest, AWarmStartOnNoPriorIsRefused) {
+  Vector theta(3);
+  theta << 2.0, -1.0, 0.5;
+  const Regression::Matrix identity = Regression::Matrix::Identity(3, 3);
+  Regression::Matrix singular = identity;
+  singular(1, 1) = 0;
+  Regression::Matrix unknown = identity;
+  unknown(2, 1) = std::nan("");
+  EXPECT_FALSE(regression_.warm_start(theta, singular, kNoise, 300));
+  EXPECT_FALSE(regression_.warm_start(theta, unknown, kNoise, 300));
+  EXPECT_FALSE(regression_.warm_start(theta, identity, 0.0, 300));
+  EXPECT_FALSE(regression_.warm_start(theta, identity, kNoise, 8));
+  EXPECT_FALSE(regression_.warm_start(theta.head(2), identity, kNoise, 300));
+  EXPECT_EQ(regression_.learned(), 0);
+  EXPECT_EQ(regression_.sigma(), 0.0);
+}
+
 }  // namespace
 }  // namespace airworthy

@@ -34,6 +34,27 @@ MonitorParams thrust_only() {
   return params;
 }
 
+// What many flights like those of Flight teach: its very coefficients.
+ChannelPrior thrust_prior() {
+  ChannelPrior prior;
+  prior.theta = {4.0, 5.0, 0.3, 0.5};
+  const std::array<double, 4> mean_square{0.005, 0.005, 0.5, 1.0};
+  for (std::size_t i = 0; i < 4; ++i) prior.gram[i * 4 + i] = mean_square[i];
+  prior.sigma = 0.25;
+  prior.threshold = 6.0;
+  prior.worth_samples = 300;
+  return prior;
+}
+
+MonitorParams warm_thrust_only(bool airspeed_sensor) {
+  MonitorParams params = thrust_only();
+  params.channels[0].warm_up = Duration{0};
+  params.configuration_count = 1;
+  params.configurations[0].airspeed_sensor = airspeed_sensor;
+  params.configurations[0].priors[0] = thrust_prior();
+  return params;
+}
+
 /// A straight flight whose forward acceleration is a known function of attitude, command and speed error,
 /// plus noise.
 class Flight {
@@ -102,6 +123,47 @@ TEST(ResponseMonitor, FindsAThrustLossWithinTwoSeconds) {
     EXPECT_NEAR(found[0].onset_s, 60.0, 0.6) << "seed " << seed;
     EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
   }
+}
+
+TEST(ResponseMonitor, AWarmStartFindsAFaultBeforeAColdOneHasLearned) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    ResponseMonitor monitor{warm_thrust_only(true)};
+    Flight flight{seed};
+    flight.fault_at_s = 10.0;
+    const auto found = flight.fly(monitor, 15.0);
+    ASSERT_EQ(found.size(), 1U) << "seed " << seed;
+    EXPECT_GE(found[0].at_s, 10.0);
+    EXPECT_LE(found[0].at_s, 11.0) << "seed " << seed;
+    EXPECT_EQ(monitor.refused_priors(), 0);
+    EXPECT_TRUE(monitor.channel(0).warm());
+  }
+}
+
+TEST(ResponseMonitor, AWarmStartIsSilentInAnHourOfHealthyFlight) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    ResponseMonitor monitor{warm_thrust_only(true)};
+    EXPECT_TRUE(Flight{seed}.fly(monitor, 600.0).empty()) << "seed " << seed;
+  }
+}
+
+TEST(ResponseMonitor, APriorOfAnotherConfigurationIsNotUsed) {
+  ResponseMonitor monitor{warm_thrust_only(false)};  // the flight has an airspeed of 20 m/s
+  (void)Flight{1}.fly(monitor, 15.0);
+  EXPECT_TRUE(monitor.airspeed_sensor());
+  EXPECT_FALSE(monitor.channel(0).warm());
+  EXPECT_EQ(monitor.refused_priors(), 0);
+}
+
+TEST(ResponseMonitor, APriorThatIsNoneIsRefusedAndCounted) {
+  MonitorParams params = warm_thrust_only(true);
+  params.configurations[0].priors[0]->gram[5] = -1.0;
+  ResponseMonitor monitor{params};
+  Flight flight{1};
+  flight.fault_at_s = 60.0;
+  const auto found = flight.fly(monitor, 70.0);
+  EXPECT_EQ(monitor.refused_priors(), 1);
+  EXPECT_FALSE(monitor.channel(0).warm());
+  EXPECT_EQ(found.size(), 1U) << "it starts cold";
 }
 
 TEST(ResponseMonitor, SilentInAnHourOfHealthyFlight) {
