@@ -73,10 +73,10 @@ class Calibrate(unittest.TestCase):
 
     def test_nested_is_warm_with_the_flight_left_out(self):
         calibration = self.folder / "others.toml"
-        left_out, others = TAUGHT_BY[-1], TAUGHT_BY[:-1]
+        left_out, *others = TRIED_ON + TAUGHT_BY
         self.assertEqual(self.calibrate(calibration, flights=others).returncode, 0)
         warm = self.evaluate("--calibration", calibration, flights=[left_out])[left_out]
-        nested = self.evaluate("--nested", "--flight-name", FLIGHT, flights=TAUGHT_BY)[left_out]
+        nested = self.evaluate("--nested", "--flight-name", FLIGHT, flights=TRIED_ON + TAUGHT_BY)[left_out]
         self.assertEqual(nested["alarms"], warm["alarms"])
         self.assertEqual(nested["outcome"], "found")
 
