@@ -29,7 +29,7 @@ struct DelayedRegressionParams {
 ///   Prediction e = y − xᵀθ;  s = σ·√(1 + κ·xᵀP·x)                                                     (4)
 ///   Scale      first σ = 1.4826·median|eⱼ|;
 ///              then σ² ← σ² + a·(1.1·min(|eⱼ|, 2.5σ)² − σ²), a = max(1/M, 1/m)                        (5)
-///   Warm start A ← A + N₀·G₀;  b ← b + N₀·G₀·θ₀;  n ← n + N₀;  σ = σ₀, m = N₀                         (6)
+///   Warm start A = N₀·G₀;  b = N₀·G₀·θ₀;  n = N₀;  σ = σ₀, m = N₀                                      (6)
 ///   Symbols    D delay_ticks, c huber_sigmas, ρ ridge, κ extrapolation_gain, M scale_memory;
 ///              θ₀, σ₀, G₀ = mean of x·xᵀ from earlier flights, N₀ the samples they are worth
 ///   Source     weighted least squares with Huber's weights; derivation in docs/equations/response.md
@@ -87,8 +87,8 @@ class DelayedRegression {
     return sigma_ > Scalar{0} ? UpdateStatus::kFused : UpdateStatus::kConverging;
   }
 
-  /// Starts from what earlier flights say (6), on top of what was learned so far. `gram` is terms × terms,
-  /// symmetric and positive definite. False, with nothing changed, where it is not, or where sizes differ.
+  /// Starts anew from what earlier flights say (6). `gram` is terms × terms, symmetric and positive definite.
+  /// False, with nothing changed, where it is not, or where sizes differ.
   [[nodiscard]] bool warm_start(const Vector& theta, const Matrix& gram, Scalar sigma,
                                 std::int64_t worth_samples) noexcept {
     if (theta.size() != params_.terms || gram.rows() != params_.terms || gram.cols() != params_.terms ||
@@ -97,9 +97,10 @@ class DelayedRegression {
     }
     if (Matrix inverse; !invert_positive_definite<Scalar, kMaxTerms>(gram, inverse)) return false;
     const auto weight = static_cast<Scalar>(worth_samples);
-    a_ += weight * gram;
-    b_ += weight * (gram * theta);
-    learned_ += worth_samples;
+    a_ = weight * gram;
+    b_ = weight * (gram * theta);
+    learned_ = worth_samples;
+    drop_unlearned();
     sigma_ = sigma;
     scale_count_ = std::max<int>(params_.scale_start, static_cast<int>(worth_samples));
     refit();

@@ -179,6 +179,7 @@ ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
       const auto index = static_cast<std::size_t>(params.term_count++);
       params.terms[index] = read_term(term, tick_s);
       params.commanded[index] = term.optional<bool>("commanded", false);
+      params.warm_only[index] = term.optional<bool>("warm_only", false);
     }
   }
   params.evidence = read_evidence(table);

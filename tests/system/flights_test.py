@@ -8,8 +8,6 @@ from system_test import SystemTest, flights, truth
 
 SPEED = 8.0
 AT_ONCE = 3
-# Raises some 17 s before the fault when played live, though not when imported: a defect not yet understood. Printed above.
-OPEN_DEFECT = {"carbonZ_2018-10-05-15-55-10_engine_failure_with_emr_traj"}
 
 
 def fly(test, name, path):
@@ -54,7 +52,7 @@ class Flights(SystemTest):
         print(f"engine: found {len(found)} of {len(results)}, median {sorted(found)[len(found) // 2]:.2f} s, "
               f"max {max(found):.2f} s")
         early = [name for name, (alarms, _, _) in results.items() if alarms and alarms[0][1] < 0]
-        self.assertLessEqual(set(early), OPEN_DEFECT, "an alarm before the fault")
+        self.assertEqual(early, [], "an alarm before the fault")
         self.assertGreaterEqual(len(found), len(results) - 3)
         self.assertLessEqual(sorted(found)[len(found) // 2], 2.0)
 

@@ -19,9 +19,11 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
                                      bool muted) noexcept {
   ChannelVerdict verdict;
   verdict.observed = response_.step(frame, tick_s);
-  const auto& x = x_;
+  auto x = x_;
   for (int i = 0; i < params_.term_count; ++i) {
-    x_(i) = regressors_[static_cast<std::size_t>(i)].step(frame, tick_s);
+    const auto term = static_cast<std::size_t>(i);
+    x_(i) = x(i) = regressors_[term].step(frame, tick_s);
+    if (params_.warm_only[term] && !warm_) x(i) = 0;
   }
 
   decltype(regression_)::Prediction prediction;

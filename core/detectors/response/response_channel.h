@@ -22,6 +22,8 @@ struct ChannelParams {
   int term_count = 0;
   std::array<Term, kMostTerms> terms{};
   std::array<bool, kMostTerms> commanded{};  ///< gain loss: these terms make up the commanded response û
+  std::array<bool, kMostTerms> warm_only{};  ///< terms that one flight is too short to tell apart: without a
+                                             ///< calibration they count as 0
   Side side = Side::kBoth;                   ///< shift: which deviation is a fault
   EvidenceParams evidence;
   double warm_drift_sigmas = 1.75;  ///< shift: k₀ in place of evidence.drift_sigmas after a warm start

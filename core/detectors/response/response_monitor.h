@@ -23,7 +23,7 @@ struct MonitorParams {
   std::array<ArxParams, kMostChannels> arx{};  ///< beside life cycle and warm-up of channels[i]
   int configuration_count = 0;                 ///< 0: a cold start, everything is learned in this flight
   std::array<VehicleConfiguration, kMostConfigurations> configurations{};
-  Duration configuration_after{5'000'000};  ///< so much flight tells which configuration this is
+  Duration configuration_after{1'000'000};  ///< so much flight tells which configuration this is
   double airspeed_sensor_above_m_s = 3.0;   ///< an airspeed sensor that works reads more than this in flight
 };
 
