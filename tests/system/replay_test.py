@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A flight recorded by lcm-logger and replayed by lcm-logplayer gives the same events at the same times."""
+"""A flight recorded by lcm-logger gives the same events at the same times: replayed by lcm-logplayer, and in airworthy eval."""
 import csv
 import importlib
 import json
@@ -113,6 +113,13 @@ class Replay(SystemTest):
         rig.stop_all()
         return log, feed
 
+    def alarms_of_eval(self, log):
+        """The faults that airworthy eval raises over a recording: component, kind, onset, detection."""
+        done = subprocess.run([BINARIES / "airworthy-eval", "--json", "--config", PROJECT / "config/response.toml", log],
+                              check=True, capture_output=True, text=True)
+        return [(alarm["component"], alarm["fault_kind"], alarm["onset_us"], alarm["time_us"])
+                for alarm in json.loads(done.stdout)["flights"][0]["alarms"]]
+
     def test_the_same_events_again(self):
         for name in FLIGHTS:
             with self.subTest(name):
@@ -124,6 +131,9 @@ class Replay(SystemTest):
                       f"replay {lost_messages(again)}")
                 self.assertGreater(len(first), 0)
                 self.assertEqual(first, second)
+                raised = [(component, kind, onset_us, detected_us)
+                          for _, phase, component, kind, onset_us, detected_us, *_ in second if phase == 1]
+                self.assertEqual(self.alarms_of_eval(live), raised)
                 self.assertEqual([event["number"] for event in feed.events()],
                                  [number for number, phase, *_ in second if phase == 1])
 
