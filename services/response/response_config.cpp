@@ -232,6 +232,8 @@ rt::Expected<ResponseConfig> load_from(const std::string& path, const std::vecto
   config.imu_sensor_id = input.optional<int>("imu_sensor_id", 0, Range{0, 127});
   const double tick_s = input.optional<double>("tick_period_s", 0.1, Range{0.01, 1.0});
   MonitorParams& monitor = config.monitor;
+  monitor.pace =
+      input.choice<Pace>("pace", {{"imu", Pace::kInertial}, {"attitude", Pace::kAttitude}}, Pace::kInertial);
   monitor.tick_period = from_seconds(tick_s);
   monitor.longest_gap = from_seconds(input.optional<double>("longest_gap_s", 1.0, Range{0.1, 60.0}));
   monitor.input_timeout = from_seconds(input.optional<double>("input_timeout_s", 2.0, Range{0.1, 60.0}));

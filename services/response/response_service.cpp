@@ -42,10 +42,11 @@ std::int8_t phase_of(Transition transition) {
   return 0;
 }
 
-std::string reason_of(MonitorState state, Muted muted, NotJudged reason) {
-  if (state == MonitorState::kInitialising) return "no inertial data yet";
+std::string reason_of(Pace pace, MonitorState state, Muted muted, NotJudged reason) {
+  const std::string data = pace == Pace::kInertial ? "inertial data" : "attitude data";
+  if (state == MonitorState::kInitialising) return "no " + data + " yet";
   if (muted == Muted::kNotFlying) return "not flying";
-  if (muted == Muted::kInputStale) return "inertial data stale";
+  if (muted == Muted::kInputStale) return data + " stale";
   switch (reason) {
     case NotJudged::kConverging:
       return "converging: still learning this flight";
@@ -70,6 +71,8 @@ ResponseService::ResponseService(rt::Node& node, const ResponseConfig& config)
                               [this](const attitude_t& message) { on_attitude(message); });
   node_.subscribe<attitude_setpoint_t>(channel::kAttitudeSetpoint,
                                        [this](const attitude_setpoint_t& message) { on_setpoint(message); });
+  node_.subscribe<rotor_command_t>(channel::kRotorCommand,
+                                   [this](const rotor_command_t& message) { on_rotor_command(message); });
   node_.subscribe<flight_state_t>(channel::kFlightState,
                                   [this](const flight_state_t& message) { on_flight_state(message); });
   node_.subscribe<tick_t>(
@@ -84,7 +87,10 @@ void ResponseService::on_imu(const imu_t& message) {
     sample.accel_m_s2[axis] = message.accel_m_s2[axis];
     sample.gyro_rad_s[axis] = message.gyro_rad_s[axis];
   }
-  if (!monitor_.on_imu(sample)) return;
+  if (monitor_.on_imu(sample)) handle_tick();
+}
+
+void ResponseService::handle_tick() {
   if (observer_) observer_(monitor_);
   const auto verdicts = monitor_.verdicts();
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
@@ -93,11 +99,18 @@ void ResponseService::on_imu(const imu_t& message) {
 }
 
 void ResponseService::on_attitude(const attitude_t& message) {
-  monitor_.on_attitude(from_us(message.header.time_us), message.roll_rad, message.pitch_rad);
+  if (monitor_.on_attitude(from_us(message.header.time_us), message.roll_rad, message.pitch_rad)) {
+    handle_tick();
+  }
 }
 
 void ResponseService::on_setpoint(const attitude_setpoint_t& message) {
-  monitor_.on_attitude_setpoint(from_us(message.header.time_us), message.roll_rad, message.pitch_rad);
+  monitor_.on_attitude_setpoint(from_us(message.header.time_us), message.roll_rad, message.pitch_rad,
+                                message.thrust_ratio);
+}
+
+void ResponseService::on_rotor_command(const rotor_command_t& message) {
+  monitor_.on_rotor_command(from_us(message.header.time_us), message.command_ratio);
 }
 
 void ResponseService::on_flight_state(const flight_state_t& message) {
@@ -160,13 +173,14 @@ void ResponseService::publish_status() {
   status.state = static_cast<std::int8_t>(state);
   const auto verdicts = monitor_.verdicts();
   if (state == MonitorState::kMuted)
-    status.muted_reason = reason_of(state, monitor_.muted(), NotJudged::kJudged);
+    status.muted_reason = reason_of(config_.monitor.pace, state, monitor_.muted(), NotJudged::kJudged);
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     component_assessment_t assessment;
     assessment.component = config_.channels[i].component;
     const bool judged = state == MonitorState::kMonitoring && verdicts[i].reason == NotJudged::kJudged;
     assessment.judged = judged ? 1 : 0;
-    if (!judged) assessment.reason = reason_of(state, monitor_.muted(), verdicts[i].reason);
+    if (!judged)
+      assessment.reason = reason_of(config_.monitor.pace, state, monitor_.muted(), verdicts[i].reason);
     assessment.evidence = evidence_of(verdicts[i], config_.channels[i].unit);
     assessment.evidence_count = static_cast<std::int32_t>(assessment.evidence.size());
     status.components.push_back(assessment);

@@ -11,6 +11,7 @@
 #include "airworthy/fault_event_t.hpp"
 #include "airworthy/flight_state_t.hpp"
 #include "airworthy/imu_t.hpp"
+#include "airworthy/rotor_command_t.hpp"
 #include "core/detectors/response/response_monitor.h"
 #include "runtime/process/node.h"
 #include "services/response/response_config.h"
@@ -37,7 +38,9 @@ class ResponseService {
   void on_imu(const imu_t& message);
   void on_attitude(const attitude_t& message);
   void on_setpoint(const attitude_setpoint_t& message);
+  void on_rotor_command(const rotor_command_t& message);
   void on_flight_state(const flight_state_t& message);
+  void handle_tick();
   void handle_verdict(std::size_t channel, const ChannelVerdict& verdict);
   void publish_status();
 

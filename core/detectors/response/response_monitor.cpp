@@ -1,6 +1,8 @@
 #include "core/detectors/response/response_monitor.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace airworthy::response {
@@ -33,51 +35,62 @@ ResponseMonitor::ResponseMonitor(const MonitorParams& params) noexcept
       arx_{make_arx_channels(params, std::make_index_sequence<kMostChannels>{})} {}
 
 bool ResponseMonitor::on_imu(const ImuSample& sample) noexcept {
+  if (params_.pace != Pace::kInertial) return false;
   if (!all_finite(sample.accel_m_s2) || !all_finite(sample.gyro_rad_s) ||
       (started_ && sample.time <= last_sample_)) {
     ++refused_samples_;
     return false;
   }
-  silent_ = false;
-  if (!started_ || sample.time - last_sample_ > params_.longest_gap) {
-    restart(sample.time);
-    return false;
-  }
-  const Duration interval = sample.time - last_sample_;
-  last_sample_ = sample.time;
+  if (!follow(sample.time)) return false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     accel_sum_[axis] += sample.accel_m_s2[axis];
     gyro_sum_[axis] += sample.gyro_rad_s[axis];
   }
   ++averaged_;
-  typical_interval_ += (interval - typical_interval_) / kIntervalMemory;
   // The sample nearest to the end of the period completes it, whatever the rate of the inertial unit. At
   // about one sample a period each is a tick of its own, however it jitters.
   if (sample.time + typical_interval_ / 2 < tick_time_ + params_.tick_period) return false;
-  finish_tick(sample.time);
+  finish_inertial_tick(sample.time);
   return true;
 }
 
-void ResponseMonitor::on_attitude(TimePoint time, double roll_rad, double pitch_rad) noexcept {
+bool ResponseMonitor::on_attitude(TimePoint time, double roll_rad, double pitch_rad) noexcept {
   if (!std::isfinite(roll_rad) || !std::isfinite(pitch_rad) ||
       (attitude_.valid() && time <= attitude_.measured_at())) {
     ++refused_samples_;
-    return;
+    return false;
   }
   attitude_.measure(time, roll_rad, pitch_rad);
   // A flight controller that repeats a value has not measured again.
   const bool fresh = !measured_.known || roll_rad != measured_.roll_rad || pitch_rad != measured_.pitch_rad;
   measured_ = {time, roll_rad, pitch_rad, true};
   if (fresh) sample_arx(Samples::kFresh, time);
+  if (params_.pace != Pace::kAttitude || !follow(time)) return false;
+  if (time + typical_interval_ / 2 < tick_time_ + params_.tick_period) return false;
+  finish_attitude_tick(time);
+  return true;
 }
 
-void ResponseMonitor::on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad) noexcept {
+void ResponseMonitor::on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad,
+                                           double thrust_ratio) noexcept {
   if (!std::isfinite(roll_rad) || !std::isfinite(pitch_rad) || (setpoint_.known && time < setpoint_.time)) {
     ++refused_samples_;
     return;
   }
-  setpoint_ = {time, roll_rad, pitch_rad, true};
+  setpoint_ = {time, roll_rad, pitch_rad, true, thrust_ratio};
   sample_arx(Samples::kEverySetpoint, time);
+}
+
+void ResponseMonitor::on_rotor_command(TimePoint time, std::span<const double> command_ratio) noexcept {
+  const std::size_t count = std::min(command_ratio.size(), commands_.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(command_ratio[i])) continue;
+    if (std::isfinite(commands_[i].ratio) && time < commands_[i].time) {
+      ++refused_samples_;
+      return;
+    }
+    commands_[i] = {time, command_ratio[i]};
+  }
 }
 
 void ResponseMonitor::on_flight_state(const FlightState& state) noexcept {
@@ -103,6 +116,18 @@ MonitorState ResponseMonitor::state() const noexcept {
   return judging ? MonitorState::kMonitoring : MonitorState::kConverging;
 }
 
+// A sample of what sets the pace; false where it is the first one, also after a gap.
+bool ResponseMonitor::follow(TimePoint time) noexcept {
+  silent_ = false;
+  if (!started_ || time - last_sample_ > params_.longest_gap) {
+    restart(time);
+    return false;
+  }
+  typical_interval_ += (time - last_sample_ - typical_interval_) / kIntervalMemory;
+  last_sample_ = time;
+  return true;
+}
+
 void ResponseMonitor::restart(TimePoint now) noexcept {
   if (started_) ++gaps_;
   started_ = true;
@@ -110,6 +135,7 @@ void ResponseMonitor::restart(TimePoint now) noexcept {
   last_sample_ = tick_time_ = now;
   averaged_ = 0;
   accel_sum_ = gyro_sum_ = {};
+  tick_attitude_ = measured_;
   for (ResponseChannel& channel : channels_) channel.restart_history();
   for (ArxChannel& channel : arx_) channel.restart_history();
 }
@@ -128,7 +154,7 @@ void ResponseMonitor::sample_arx(Samples samples, TimePoint time) noexcept {
   }
 }
 
-void ResponseMonitor::finish_tick(TimePoint now) noexcept {
+void ResponseMonitor::finish_inertial_tick(TimePoint now) noexcept {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     accel_[axis] = accel_sum_[axis] / averaged_;
     gyro_[axis] = gyro_sum_[axis] / averaged_;
@@ -136,19 +162,36 @@ void ResponseMonitor::finish_tick(TimePoint now) noexcept {
   averaged_ = 0;
   accel_sum_ = gyro_sum_ = {};
   const Duration elapsed = now - tick_time_;
-  tick_time_ = now;
   attitude_.step(now, to_seconds(elapsed), gyro_[0], gyro_[1], gyro_[2]);
+  const double roll = attitude_.roll_rad();
+  euler_pitch_rate_ = gyro_[1] * std::cos(roll) - gyro_[2] * std::sin(roll);
+  judge_tick(now, elapsed);
+}
 
+void ResponseMonitor::finish_attitude_tick(TimePoint now) noexcept {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  const Duration elapsed = now - tick_time_;
+  const double elapsed_s = to_seconds(elapsed);
+  accel_ = {kUnknown, kUnknown, kUnknown};
+  gyro_ = {std::remainder(measured_.roll_rad - tick_attitude_.roll_rad, 2 * std::numbers::pi) / elapsed_s,
+           kUnknown, kUnknown};
+  euler_pitch_rate_ = (measured_.pitch_rad - tick_attitude_.pitch_rad) / elapsed_s;
+  tick_attitude_ = measured_;
+  judge_tick(now, elapsed);
+}
+
+void ResponseMonitor::judge_tick(TimePoint now, Duration elapsed) noexcept {
+  tick_time_ = now;
   muted_ = flying() ? Muted::kNo : Muted::kNotFlying;
   if (muted_ == Muted::kNo) flown_ += elapsed;
   choose_configuration();
-  const SignalFrame signals = frame(now);
+  signals_ = frame(now);
   for (int i = 0; i < params_.channel_count; ++i) {
     const auto channel = static_cast<std::size_t>(i);
     const bool silent = muted_ != Muted::kNo;
     verdicts_[channel] = params_.methods[channel] == Method::kArx
                              ? arx_[channel].step(now, flown_, silent)
-                             : channels_[channel].step(signals, to_seconds(elapsed), now, flown_, silent);
+                             : channels_[channel].step(signals_, to_seconds(elapsed), now, flown_, silent);
   }
 }
 
@@ -177,16 +220,20 @@ SignalFrame ResponseMonitor::frame(TimePoint now) const noexcept {
   signals[Signal::kPitchRate] = gyro_[1];
   signals[Signal::kYawRate] = gyro_[2];
   if (attitude_.valid() && now - attitude_.measured_at() <= params_.input_timeout) {
-    const double roll = attitude_.roll_rad();
-    signals[Signal::kRoll] = roll;
+    signals[Signal::kRoll] = attitude_.roll_rad();
     signals[Signal::kPitch] = attitude_.pitch_rad();
-    signals[Signal::kEulerPitchRate] = gyro_[1] * std::cos(roll) - gyro_[2] * std::sin(roll);
+    signals[Signal::kEulerPitchRate] = euler_pitch_rate_;
   }
   if (setpoint_.known && now - setpoint_.time <= params_.input_timeout) {
     signals[Signal::kRollSetpoint] = setpoint_.roll_rad;
     signals[Signal::kPitchSetpoint] = setpoint_.pitch_rad;
     signals[Signal::kRollError] = setpoint_.roll_rad - signals[Signal::kRoll];
     signals[Signal::kPitchError] = setpoint_.pitch_rad - signals[Signal::kPitch];
+    signals[Signal::kThrustSetpoint] = setpoint_.thrust_ratio;
+  }
+  for (std::size_t i = 0; i < commands_.size(); ++i) {
+    if (now - commands_[i].time > params_.input_timeout) continue;
+    signals[static_cast<Signal>(static_cast<std::size_t>(Signal::kCommand0) + i)] = commands_[i].ratio;
   }
   if (flight_state_known_ && now - flight_state_.time <= params_.input_timeout) {
     signals[Signal::kAltitudeError] = flight_state_.altitude_error_m;

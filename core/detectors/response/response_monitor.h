@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 
 #include "core/detectors/response/arx_channel.h"
@@ -12,9 +13,17 @@ namespace airworthy::response {
 /// How a channel expects its response.
 enum class Method : std::uint8_t { kRegression, kArx };
 
+/// Whose samples set the pace of the ticks.
+enum class Pace : std::uint8_t {
+  kInertial,  ///< the inertial unit's, averaged over a tick
+  kAttitude,  ///< the measured attitude's, for links that carry hardly any inertial data: roll rate and pitch
+              ///< rate are then differences of angles, and accelerations are unknown
+};
+
 struct MonitorParams {
-  Duration tick_period{100'000};      ///< the inertial samples of a period are averaged into one tick
-  Duration longest_gap{1'000'000};    ///< a longer silence of the inertial unit restarts all delays
+  Pace pace = Pace::kInertial;
+  Duration tick_period{100'000};
+  Duration longest_gap{1'000'000};    ///< a longer silence of what sets the pace restarts all delays
   Duration input_timeout{2'000'000};  ///< attitude, set-point and flight state older than this are unknown
   double min_groundspeed_m_s = 0;     ///< slower is not flying; 0 = not asked
   int channel_count = 0;
@@ -58,11 +67,17 @@ class ResponseMonitor {
 
   /// True if the sample completed a tick: verdicts() are then new.
   [[nodiscard]] bool on_imu(const ImuSample& sample) noexcept;
-  void on_attitude(TimePoint time, double roll_rad, double pitch_rad) noexcept;
-  void on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad) noexcept;
+  /// The same where the attitude sets the pace.
+  bool on_attitude(TimePoint time, double roll_rad, double pitch_rad) noexcept;
+  /// `thrust_ratio` may be NaN: not known.
+  void on_attitude_setpoint(TimePoint time, double roll_rad, double pitch_rad,
+                            double thrust_ratio = std::numeric_limits<double>::quiet_NaN()) noexcept;
+  /// Normalised commands of the actuators, NaN where this message has none; those beyond kMostCommands are
+  /// not used.
+  void on_rotor_command(TimePoint time, std::span<const double> command_ratio) noexcept;
   void on_flight_state(const FlightState& state) noexcept;
 
-  /// Judges silence, on the gateway's clock: with no inertial sample for `longest_gap` the monitor is muted.
+  /// Judges silence, on the gateway's clock: with no sample of what sets the pace for `longest_gap` the monitor is muted.
   /// Evidence is not touched, so the verdicts never depend on how ticks and samples interleave.
   void on_clock(TimePoint now) noexcept;
 
@@ -72,6 +87,8 @@ class ResponseMonitor {
   [[nodiscard]] std::span<const ChannelVerdict> verdicts() const noexcept {
     return {verdicts_.data(), static_cast<std::size_t>(params_.channel_count)};
   }
+  /// What the channels saw at the newest tick.
+  [[nodiscard]] const SignalFrame& signals() const noexcept { return signals_; }
   [[nodiscard]] const ResponseChannel& channel(int index) const noexcept {
     return channels_[static_cast<std::size_t>(index)];
   }
@@ -88,10 +105,18 @@ class ResponseMonitor {
     double roll_rad;
     double pitch_rad;
     bool known = false;
+    double thrust_ratio = std::numeric_limits<double>::quiet_NaN();
+  };
+  struct Command {
+    TimePoint time;
+    double ratio = std::numeric_limits<double>::quiet_NaN();
   };
 
   void restart(TimePoint now) noexcept;
-  void finish_tick(TimePoint now) noexcept;
+  [[nodiscard]] bool follow(TimePoint time) noexcept;
+  void finish_inertial_tick(TimePoint now) noexcept;
+  void finish_attitude_tick(TimePoint now) noexcept;
+  void judge_tick(TimePoint now, Duration elapsed) noexcept;
   void choose_configuration() noexcept;
   void sample_arx(Samples samples, TimePoint time) noexcept;
   [[nodiscard]] SignalFrame frame(TimePoint now) const noexcept;
@@ -105,6 +130,7 @@ class ResponseMonitor {
   AttitudePropagator<double> attitude_;
   Angles measured_{};  ///< the newest measured attitude, as it came
   Angles setpoint_{};
+  std::array<Command, kMostCommands> commands_{};
   FlightState flight_state_{};
   bool flight_state_known_ = false;
 
@@ -117,6 +143,9 @@ class ResponseMonitor {
   std::array<double, 3> gyro_sum_{};
   std::array<double, 3> accel_{};
   std::array<double, 3> gyro_{};
+  Angles tick_attitude_{};  ///< measured at the last tick, where the attitude sets the pace
+  double euler_pitch_rate_ = 0;
+  SignalFrame signals_;
   Duration flown_{0};
   Muted muted_ = Muted::kNo;
   bool silent_ = false;

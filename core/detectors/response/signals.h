@@ -30,8 +30,18 @@ enum class Signal : std::uint8_t {
   kAirspeedError,
   kAirspeed,
   kClimb,
+  kThrustSetpoint,
+  kCommand0,  ///< kCommand0 + i: normalised command of actuator i, as ROTOR_COMMAND has it
+  kCommand1,
+  kCommand2,
+  kCommand3,
+  kCommand4,
+  kCommand5,
+  kCommand6,
+  kCommand7,
 };
-inline constexpr int kSignals = 18;
+inline constexpr int kSignals = 27;
+inline constexpr int kMostCommands = 8;
 
 /// Names as the configuration writes them, in the order of Signal.
 inline constexpr std::array<std::string_view, kSignals> kSignalNames{"one",
@@ -51,7 +61,16 @@ inline constexpr std::array<std::string_view, kSignals> kSignalNames{"one",
                                                                      "altitude_error_m",
                                                                      "airspeed_error_m_s",
                                                                      "airspeed_m_s",
-                                                                     "climb_m_s"};
+                                                                     "climb_m_s",
+                                                                     "thrust_setpoint_ratio",
+                                                                     "command_0_ratio",
+                                                                     "command_1_ratio",
+                                                                     "command_2_ratio",
+                                                                     "command_3_ratio",
+                                                                     "command_4_ratio",
+                                                                     "command_5_ratio",
+                                                                     "command_6_ratio",
+                                                                     "command_7_ratio"};
 
 [[nodiscard]] constexpr std::string_view to_string(Signal signal) {
   return kSignalNames[static_cast<std::size_t>(signal)];

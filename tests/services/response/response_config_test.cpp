@@ -47,6 +47,16 @@ TEST_F(ResponseConfigTest, TheShippedFileIsValid) {
   EXPECT_EQ(config->monitor.channels[1].terms[1].delay_ticks, 3);
 }
 
+TEST_F(ResponseConfigTest, TheShippedFilesOfOtherVehiclesAreValid) {
+  for (const char* name : {"response_elevon", "response_lift", "response_multirotor"}) {
+    const auto config =
+        ResponseConfig::load(std::string{AIRWORTHY_SOURCE_DIR "/config/"} + name + ".toml", {});
+    ASSERT_TRUE(config) << config.error().text;
+    EXPECT_EQ(config->monitor.pace,
+              name == std::string{"response_elevon"} ? Pace::kAttitude : Pace::kInertial);
+  }
+}
+
 TEST_F(ResponseConfigTest, EveryProblemIsReportedAtOnce) {
   EXPECT_EQ(
       error_of(R"(vehicle = "vehicle.toml"
@@ -71,7 +81,10 @@ colour = "red"
       "response.toml:10:13: channel[0].response.signal: \"accel_w_m_s2\" is not one of one, accel_x_m_s2, "
       "accel_y_m_s2, accel_z_m_s2, roll_rate_rad_s, pitch_rate_rad_s, yaw_rate_rad_s, roll_rad, pitch_rad, "
       "euler_pitch_rate_rad_s, roll_setpoint_rad, pitch_setpoint_rad, roll_error_rad, pitch_error_rad, "
-      "altitude_error_m, airspeed_error_m_s, airspeed_m_s, climb_m_s\n"
+      "altitude_error_m, airspeed_error_m_s, airspeed_m_s, climb_m_s, thrust_setpoint_ratio, "
+      "command_0_ratio, "
+      "command_1_ratio, command_2_ratio, command_3_ratio, command_4_ratio, command_5_ratio, command_6_ratio, "
+      "command_7_ratio\n"
       "response.toml:12:27: channel[0].terms[0].delay_s: 0.25 is not a multiple of input.tick_period_s "
       "(0.1)\n"
       "response.toml:12:67: channel[0].terms[1].transform: must be one of none, sine, absolute_sine, "

@@ -245,6 +245,84 @@ TEST(ResponseMonitor, ATimeShiftChangesNothing) {
   }
 }
 
+// A quadrotor's lift from four commands: which one is too weak does not matter, what is commanded does.
+TEST(ResponseMonitor, APairMayHaveSeveralInputs) {
+  MonitorParams params;
+  params.channel_count = 1;
+  params.tick_period = Duration{50'000};
+  ChannelParams& channel = params.channels[0];
+  channel.response.signal = Signal::kAccelZ;
+  for (std::size_t i = 0; i < 4; ++i) {
+    channel.terms[i].signal = static_cast<Signal>(static_cast<std::size_t>(Signal::kCommand0) + i);
+  }
+  channel.terms[4].signal = Signal::kOne;
+  channel.term_count = channel.regression.terms = 5;
+  channel.side = Side::kHigh;
+  for (const bool fails : {false, true}) {
+    ResponseMonitor monitor{params};
+    std::mt19937 random{7};
+    std::normal_distribution<double> normal;
+    std::optional<double> raised_s;
+    for (int i = 0; i < 60 * 100; ++i) {
+      const double t = 0.01 * i;
+      const TimePoint time = from_us(1'000'000) + from_seconds(t);
+      std::array<double, 4> command{};
+      double lift = 0;
+      for (std::size_t k = 0; k < 4; ++k) {
+        command[k] = 0.5 + 0.1 * std::sin(0.3 * t * static_cast<double>(k + 1));
+        lift += 4.9 * command[k] * (fails && k == 2 && t >= 50 ? 0.5 : 1.0);
+      }
+      monitor.on_rotor_command(time, command);
+      if (!monitor.on_imu({time, {0, 0, -lift + 0.3 * normal(random)}, {0, 0, 0}})) continue;
+      if (monitor.verdicts()[0].transition == Transition::kRaise) raised_s = t;
+    }
+    EXPECT_EQ(raised_s.has_value(), fails);
+    if (raised_s) {
+      EXPECT_GE(*raised_s, 50.0);
+      EXPECT_LE(*raised_s, 51.0);
+    }
+  }
+}
+
+// A link that carries attitude and set-points, but hardly any inertial data.
+TEST(ResponseMonitor, TheAttitudeMaySetThePace) {
+  MonitorParams params;
+  params.pace = Pace::kAttitude;
+  params.longest_gap = Duration{3'000'000};
+  params.channel_count = 1;
+  ChannelParams& channel = params.channels[0];
+  channel.response.signal = Signal::kRollRate;
+  channel.terms[0].signal = Signal::kRollError;
+  channel.terms[0].delay_ticks = 1;
+  channel.terms[1].signal = Signal::kOne;
+  channel.term_count = channel.regression.terms = 2;
+  for (const bool fails : {false, true}) {
+    ResponseMonitor monitor{params};
+    std::mt19937 random{5};
+    std::normal_distribution<double> normal;
+    double roll = 0;
+    std::optional<double> raised_s;
+    for (int i = 0; i < 900; ++i) {
+      const double t = 0.1 * i;
+      const TimePoint time = from_us(1'000'000) + from_seconds(t);
+      const double setpoint = 0.5 * std::sin(0.4 * t);
+      const bool failed = fails && t >= 70;
+      // In the fault the vehicle rolls away.
+      roll += 0.1 * ((failed ? -0.3 : 1.5 * (setpoint - roll)) + 0.05 * normal(random));
+      monitor.on_attitude_setpoint(time, setpoint, 0.0);
+      EXPECT_FALSE(monitor.on_imu({time, {0, 0, -9.81}, {0, 0, 0}})) << "not the pace";
+      if (!monitor.on_attitude(time, roll, 0.0)) continue;
+      if (monitor.verdicts()[0].transition == Transition::kRaise) raised_s = t;
+    }
+    EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+    EXPECT_EQ(raised_s.has_value(), fails);
+    if (raised_s) {
+      EXPECT_GE(*raised_s, 70.0);
+      EXPECT_LE(*raised_s, 74.0);
+    }
+  }
+}
+
 // Everything hostile is refused, counted, and the verdict is the same as without it.
 TEST(ResponseMonitor, HostileSamplesChangeNothing) {
   Flight clean{4};
