@@ -12,6 +12,7 @@
 
 #include "cli/calibrate/flight_name.h"
 #include "cli/calibrate/learning.h"
+#include "cli/calibrate/suggest_pairs.h"
 #include "runtime/process/exit.h"
 
 namespace {
@@ -25,6 +26,8 @@ struct Options {
   std::string output;
   std::string vehicle;
   std::string flight_name;
+  bool suggest_pairs = false;
+  bool json = false;
   calibrate::LearningParams learning;
 };
 
@@ -92,6 +95,24 @@ void print_summary(const calibrate::Learned& learned, const std::vector<std::str
   for (const std::string& note : learned.notes) fmt::print("note: {}\n", note);
 }
 
+int suggest(const Options& options, const response::ResponseConfig& config) {
+  std::vector<calibrate::SignalRecord> records;
+  int failures = EX_OK;
+  for (const std::string& log : options.logs) {
+    auto record = calibrate::read_signals(log, config);
+    if (record) {
+      records.push_back(std::move(*record));
+    } else {
+      failures = rt::fail(EX_DATAERR, record.error());
+    }
+  }
+  if (failures != EX_OK) return failures;
+  const auto suggestions = calibrate::suggest_pairs(records);
+  const double tick_s = to_seconds(config.monitor.tick_period);
+  fmt::print("{}", options.json ? to_json(suggestions, tick_s) : to_table(suggestions, tick_s));
+  return EX_OK;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "Learns from healthy flights of a vehicle what its responses are, how much they vary and how far its "
@@ -106,7 +127,13 @@ int run(int argc, char** argv) {
   app.add_option("--config", options.config_path, "configuration of airworthy-response")->required();
   app.add_option("--set", options.overrides, "override of a key, as KEY=VALUE; repeatable")
       ->allow_extra_args(false);
-  app.add_option("-o,--output", options.output, "calibration file to write")->required();
+  auto* output = app.add_option("-o,--output", options.output, "calibration file to write");
+  auto* suggestion =
+      app.add_flag("--suggest-pairs", options.suggest_pairs,
+                   "write no file; rank which measured signals follow which commanded ones in the logs, "
+                   "for channels of your own");
+  suggestion->excludes(output);
+  app.add_flag("--json", options.json, "--suggest-pairs: print JSON instead of a table")->needs(suggestion);
   app.add_option("--vehicle", options.vehicle, "vehicle whose logs these are; default: the configured one");
   app.add_option(
       "--flight-name", options.flight_name,
@@ -121,11 +148,15 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? EX_OK : EX_USAGE;
   }
+  if (!options.suggest_pairs && options.output.empty()) {
+    return rt::fail(EX_USAGE, rt::Error{"airworthy-calibrate: --output FILE or --suggest-pairs is needed"});
+  }
   const auto flight_name = calibrate::FlightName::parse(options.flight_name);
   if (!flight_name) return rt::fail(EX_USAGE, flight_name.error());
   // Learning starts from nothing, whatever the configuration names.
   const auto config = response::ResponseConfig::load_cold(options.config_path, options.overrides);
   if (!config) return rt::fail(EX_CONFIG, config.error());
+  if (options.suggest_pairs) return suggest(options, *config);
   if (options.vehicle.empty()) options.vehicle = config->vehicle;
 
   const auto flights = read_flights(options, *config, *flight_name);

@@ -104,6 +104,19 @@ class Calibrate(unittest.TestCase):
         self.assertEqual(done.returncode, 65)
         self.assertIn('of vehicle "alfa", but the calibration is of "other"', done.stderr)
 
+    def test_suggested_pairs_begin_with_the_attitude_and_its_set_point(self):
+        done = run(CALIBRATE, "--config", CONFIG / "response.toml", "--suggest-pairs", "--json", *self.logs(TAUGHT_BY))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        pairs = [(pair["inputs"][0]["signal"], pair["response"], pair["score"]) for pair in json.loads(done.stdout)["pairs"]]
+        self.assertEqual(pairs[0][:2], ("roll_setpoint_rad", "roll_rad"))
+        self.assertIn(("roll_error_rad", "roll_rate_rad_s"), [pair[:2] for pair in pairs])
+        self.assertEqual([score for *_, score in pairs], sorted((score for *_, score in pairs), reverse=True))
+
+    def test_neither_output_nor_suggestion_is_a_usage_error(self):
+        done = run(CALIBRATE, "--config", CONFIG / "response.toml", *self.logs(TAUGHT_BY[:1]))
+        self.assertEqual(done.returncode, 64)
+        self.assertIn("--output FILE or --suggest-pairs is needed", done.stderr)
+
     def test_an_output_that_cannot_be_written_is_an_error(self):
         done = self.calibrate(self.folder / "missing" / "out.toml")
         self.assertEqual(done.returncode, 73)
