@@ -78,7 +78,8 @@ std::string to_table(const Evaluation& evaluation) {
                        to_string(score.outcome), delay, first);
   }
   const Totals totals = total(evaluation.scores);
-  out += "\n" + totals_line("first alarm decides", totals);
+  out += '\n';
+  out += totals_line("first alarm decides", totals);
   out += totals_line("0.5 s early allowed", total(evaluation.tolerant_scores));
   out += fmt::format(
       "delay mean {} median {} max {} s   false alarms {} in {} h: {} per hour (95 %: {} to {})\n\n",
