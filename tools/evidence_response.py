@@ -212,6 +212,6 @@ def response_sets(_):
         "| run | first alarm |", "|---|---|", *(f"| {flight['flight']} | {what_happened(flight)} |" for flight in rotor["flights"]),
         "", "## A pair of several inputs on healthy multirotors (real)", "",
         "`config/response_lift.toml`: vertical acceleration against the commands of all rotors. These sets carry no attitude",
-        "set-point, so there is no attitude pair to try; bebop2_prop_eject carries no commands at all. Violent throws of 6 to",
-        "25 s are not what a cold start of 10 s is for; flights this short say little about hours.", "",
+        "set-point, so there is no attitude pair to try; bebop2_prop_eject has set-points of rates only, which no pair uses.",
+        "Violent throws of 6 to 25 s are not what a cold start of 10 s is for, and flights this short say little about hours.", "",
         "| set | flights | alarms, any time | false alarms after 20 s | per hour, 95 % |", "|---|--:|--:|--:|---|", *lift])
