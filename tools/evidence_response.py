@@ -5,6 +5,7 @@ import lzma
 import os
 import pathlib
 import tempfile
+import time
 
 from evidence_page import ROOT, Failed, build, circumstances, page, run
 
@@ -113,6 +114,33 @@ def alfa(_):
         "Found, with delay mean and maximum in seconds (CSV):", "",
         "| fault | " + " | ".join(kinds) + " |", "|---" * (len(kinds) + 1) + "|", *kind_rows, "",
         "| flight (CSV) | " + " | ".join(flights) + " |", "|---" * (len(flights) + 1) + "|", *flight_rows])
+
+
+def eval_throughput(binaries):
+    """Lines for the page of benchmarks: flight hours a minute, by number of jobs."""
+    data = recorded_data()
+    copies, repetitions = 20, 5
+    lines = ["", "## airworthy eval", "",
+             f"The ALFA flights {copies} times over, shipped configuration, cold; the fastest of {repetitions} runs.", "",
+             "| jobs | flight hours | time | flight hours per minute | ratio to one job |", "|--:|--:|--:|--:|--:|"]
+    with tempfile.TemporaryDirectory() as name:
+        run(binaries / "airworthy-import", "alfa", *sorted((data / "alfa").glob("carbonZ*")), "-o", name, capture_output=True)
+        logs = sorted(pathlib.Path(name).glob("*.lcm")) * copies
+        single = None
+        for jobs in sorted({1, 2, os.cpu_count()}):
+            durations = []
+            for _ in range(repetitions):
+                begun = time.monotonic()
+                done = run(binaries / "airworthy-eval", "--json", "--jobs", jobs, "--config", ROOT / "config/response.toml", *logs,
+                           capture_output=True)
+                durations.append(time.monotonic() - begun)
+                if done.returncode != 0:
+                    raise Failed(f"airworthy eval failed:\n{done.stderr}")
+            hours = sum(flight["duration_s"] for flight in json.loads(done.stdout)["flights"]) / 3600
+            rate = hours / (min(durations) / 60)
+            single = single or rate
+            lines.append(f"| {jobs} | {hours:.1f} | {min(durations):.2f} s | {rate:.0f} | {rate / single:.2f} |")
+    return lines
 
 
 def rows_of(path):

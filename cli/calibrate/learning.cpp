@@ -97,9 +97,10 @@ std::optional<Fit> fit_prior(const Flights& flights, std::size_t channel, int te
       weights[k] = std::min(1.0, kHuberSigmas * fit.prior.sigma / std::max(errors[k], 1e-300));
     }
   }
+  auto next = fit.prior.gram.begin();
   for (int i = 0; i < terms; ++i) {
     fit.prior.theta[static_cast<std::size_t>(i)] = theta(i);
-    for (int j = 0; j < terms; ++j) fit.prior.gram[static_cast<std::size_t>(i * terms + j)] = gram(i, j);
+    for (int j = 0; j < terms; ++j) *next++ = gram(i, j);
   }
   fit.prior.worth_samples = worth_samples;
   fit.prior.threshold = kThresholdOutOfReach;

@@ -110,10 +110,15 @@ std::string to_json(const Evaluation& evaluation) {
                         {"component", alarm.component},
                         {"fault_kind", alarm.fault_kind}});
     }
-    Json row{{"flight", flight.name},        {"truth", fault_of(flight)},
-             {"onset_us", nullptr},          {"outcome", to_string(score.outcome)},
-             {"delay_s", nullptr},           {"false_alarms", score.false_alarms},
-             {"healthy_s", score.healthy_s}, {"alarms", alarms}};
+    Json row{{"flight", flight.name},
+             {"truth", fault_of(flight)},
+             {"onset_us", nullptr},
+             {"outcome", to_string(score.outcome)},
+             {"delay_s", nullptr},
+             {"false_alarms", score.false_alarms},
+             {"healthy_s", score.healthy_s},
+             {"duration_s", to_seconds(flight.end - flight.start)},
+             {"alarms", alarms}};
     if (flight.truth && flight.truth->onset) row["onset_us"] = to_us(*flight.truth->onset);
     if (score.outcome == Outcome::kTruePositive) row["delay_s"] = score.delay_s;
     flights.push_back(row);

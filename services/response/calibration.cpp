@@ -91,7 +91,7 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
     configuration.airspeed_sensor = table.required<bool>("airspeed_sensor");
     configuration.flights = table.optional<int>("flights", 0);
     configuration.flown_s = table.optional<double>("flown_s", 0.0);
-    for (ConfigTable channel :
+    for (const ConfigTable& channel :
          table.tables("channel", {.unique_key = "name", .count = Count{1, kMostChannels}})) {
       configuration.channels.push_back(read_channel(channel));
     }

@@ -71,11 +71,10 @@ bool ResponseChannel::warm_start(const ChannelPrior& prior) noexcept {
   using Regression = decltype(regression_);
   auto theta = Regression::Vector{params_.term_count};
   auto gram = Regression::Matrix{params_.term_count, params_.term_count};
+  auto next = prior.gram.begin();
   for (int i = 0; i < params_.term_count; ++i) {
     theta(i) = prior.theta[static_cast<std::size_t>(i)];
-    for (int j = 0; j < params_.term_count; ++j) {
-      gram(i, j) = prior.gram[static_cast<std::size_t>(i * params_.term_count + j)];
-    }
+    for (int j = 0; j < params_.term_count; ++j) gram(i, j) = *next++;
   }
   if (!(prior.threshold > 0)) return false;
   if (!regression_.warm_start(theta, gram, prior.sigma, prior.worth_samples)) return false;
