@@ -14,7 +14,7 @@ import time
 import flight_rig
 
 DATA = pathlib.Path(os.environ.get("AIRWORTHY_DATA", flight_rig.PROJECT.parent / "shared/data"))
-DEFAULT_FLIGHT = "alfa_mavlink/carbonZ_2018-09-11-14-22-07_2_engine_failure.tlog.xz"
+DEFAULT_FLIGHT = "alfa_mavlink/carbonZ_2018-10-05-15-52-12_3_engine_failure_with_emr_traj.tlog.xz"
 
 
 def arguments():
