@@ -176,6 +176,11 @@ void for_each_parallel(std::size_t count, unsigned jobs, const std::function<voi
 rt::Expected<Learned> learn(const std::vector<const HealthyFlight*>& flights, const ResponseConfig& config,
                             const LearningParams& params) {
   if (flights.empty()) return rt::fail_with("no flights to learn from");
+  const auto& methods = config.monitor.methods;
+  if (std::count(methods.begin(), methods.begin() + config.monitor.channel_count,
+                 response::Method::kRegression) == 0) {
+    return rt::fail_with("no channel is of method regression, so there is nothing to learn");
+  }
   Learned learned;
   learned.calibration.vehicle = flights.front()->vehicle;
   learned.calibration.false_alarms_per_hour = params.false_alarms_per_hour;

@@ -169,6 +169,14 @@ TEST_F(LearningTest, FlightsOfTwoVehiclesAreRefused) {
   EXPECT_THAT(learn_all().error().text, HasSubstr("of vehicle \"v2\", but"));
 }
 
+TEST_F(LearningTest, ChannelsThatLearnNothingAreRefused) {
+  read(record("f", 100.0));
+  auto config = thrust_config();
+  config.monitor.methods[0] = response::Method::kArx;
+  EXPECT_EQ(learn({&flights_[0]}, config, {}).error().text,
+            "no channel is of method regression, so there is nothing to learn");
+}
+
 TEST_F(LearningTest, FlightsTooShortForAThresholdAreRefused) {
   for (int i = 0; i < 3; ++i) read(record("f" + std::to_string(i), 60.0));
   EXPECT_THAT(learn_all().error().text,
