@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/config/multirotor_table.h"
+
 namespace airworthy::rt {
 
 bool VehicleFile::is_valid_name(std::string_view name) {
@@ -24,6 +26,12 @@ Expected<VehicleFile> VehicleFile::read(ConfigFile file) {
   vehicle.kind = root.choice<VehicleKind>(
       "kind", {{"multirotor", VehicleKind::kMultirotor}, {"fixed_wing", VehicleKind::kFixedWing}});
   vehicle.description = root.optional<std::string>("description", "");
+  if (const auto table = root.optional_table("multirotor")) {
+    vehicle.multirotor = read_multirotor(*table);
+    if (vehicle.kind != VehicleKind::kMultirotor) {
+      root.fail("multirotor", "describes a multirotor, but kind is another", {"kind"});
+    }
+  }
   vehicle.hash = file.hash();
   return file.finish(std::move(vehicle));
 }

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/vehicle/multirotor.h"
 #include "runtime/config/config_file.h"
 #include "runtime/error.h"
 
@@ -21,7 +23,8 @@ struct VehicleFile {
   std::string name;  ///< prefix of every channel; [A-Za-z0-9_-]{1,16}
   VehicleKind kind = VehicleKind::kMultirotor;
   std::string description;
-  std::string hash;  ///< of the effective content, see ConfigFile::hash()
+  std::optional<Multirotor> multirotor;  ///< nominal geometry and motors, where the file describes them
+  std::string hash;                      ///< of the effective content, see ConfigFile::hash()
 
   [[nodiscard]] static Expected<VehicleFile> load(const std::filesystem::path& path);
   [[nodiscard]] static Expected<VehicleFile> read(ConfigFile file);

@@ -1,0 +1,152 @@
+#include <fmt/format.h>
+#include <signal.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "cli/sim/flight.h"
+#include "cli/sim/live.h"
+#include "cli/sim/record.h"
+#include "runtime/process/exit.h"
+
+namespace {
+
+using namespace airworthy;
+
+struct Options {
+  std::string vehicle_path;
+  std::string scenario_path;
+  std::vector<std::string> overrides;
+  sim::Level level = sim::Level::kHard;
+  std::uint64_t seed = 1;
+  double duration_s = 0.0;
+  double imu_average_ms = 0.0;
+  std::string log;
+  std::string live;
+  double speed = 1.0;
+};
+
+volatile sig_atomic_t stop_requested = 0;
+
+void request_stop(int) { stop_requested = 1; }
+
+/// One line on stderr, where that is a terminal.
+sim_command::Progress progress_bar(double duration_s) {
+  using Clock = std::chrono::steady_clock;
+  return [duration_s, is_terminal = isatty(STDERR_FILENO) == 1, start = Clock::now(),
+          next = Clock::now()](double time_s) mutable {
+    if (stop_requested != 0) return false;
+    if (!is_terminal || Clock::now() < next) return true;
+    next = Clock::now() + std::chrono::milliseconds{200};
+    const std::chrono::duration<double> elapsed = Clock::now() - start;
+    constexpr int kWidth = 40;
+    const int done = static_cast<int>(kWidth * time_s / duration_s);
+    fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {:.0f} of {:.0f} s, {:.0f} times real time ", "", done, "",
+               kWidth - done, time_s, duration_s, time_s / std::max(elapsed.count(), 1e-3));
+    return true;
+  };
+}
+
+rt::Expected<sim_command::Flight> read_flight(const Options& options) {
+  auto vehicle = rt::VehicleFile::load(options.vehicle_path);
+  if (!vehicle) return tl::unexpected<rt::Error>{vehicle.error()};
+  if (!vehicle->multirotor) {
+    return rt::fail_with(options.vehicle_path + ": has no table [multirotor]: nothing to simulate");
+  }
+  const std::size_t rotors = vehicle->multirotor->rotor_count;
+  auto scenario = sim::Scenario::load(options.scenario_path, rotors, options.overrides);
+  if (!scenario) return tl::unexpected<rt::Error>{scenario.error()};
+  sim_command::Flight flight{std::move(*vehicle), std::move(*scenario), sim::Realism::at(options.level),
+                             options.seed, options.duration_s};
+  if (flight.duration_s <= 0.0) flight.duration_s = flight.scenario.duration_s();
+  if (options.imu_average_ms > 0.0) {
+    flight.realism.imu.averaging_window_s = options.imu_average_ms * 1e-3;
+    flight.realism.imu.rate_Hz = 1e3 / options.imu_average_ms;
+  }
+  return flight;
+}
+
+int run_live(const Options& options, const sim_command::Flight& flight) {
+  const auto flown =
+      sim_command::fly_live(flight, options.live, options.speed, progress_bar(flight.duration_s));
+  if (!flown) return rt::fail(EX_UNAVAILABLE, flown.error());
+  fmt::print("flown {:.1f} s, {} frames not read, at most {:.0f} ms behind the clock\n", flown->flown_s,
+             flown->writes_dropped, flown->most_behind_s * 1e3);
+  return EX_OK;
+}
+
+int run_recorded(const Options& options, const sim_command::Flight& flight) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto recording = sim_command::record(flight, options.log, progress_bar(flight.duration_s));
+  if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\x1b[K");
+  if (!recording) return rt::fail(EX_CANTCREAT, recording.error());
+  if (recording->stopped) return rt::fail(EX_TEMPFAIL, rt::Error{"airworthy-sim: stopped, no log written"});
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  const auto bytes = static_cast<double>(std::filesystem::file_size(options.log));
+  fmt::print("{}: {:.1f} s, {:.1f} MB ({:.2f} MB per minute), {:.0f} times real time\n", options.log,
+             flight.duration_s, bytes * 1e-6, bytes * 1e-6 * 60.0 / flight.duration_s,
+             flight.duration_s / elapsed.count());
+  for (const auto& [channel, count] : recording->messages) fmt::print("  {:<28} {:>9}\n", channel, count);
+  return EX_OK;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Flies a simulated multirotor, healthy or with faults, into a log or live on a serial line.",
+               "airworthy sim"};
+  Options options;
+  app.add_option("--vehicle", options.vehicle_path, "vehicle file with a table [multirotor]")->required();
+  app.add_option("--scenario", options.scenario_path, "flight plan and faults, see config/scenarios")
+      ->required();
+  app.add_option("--set", options.overrides, "override of a key of the scenario, as KEY=VALUE; repeatable")
+      ->allow_extra_args(false);
+  app.add_option("--level", options.level, "realism: nominal, hard or brutal; default hard")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Level>{
+          {"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}}));
+  app.add_option("--seed", options.seed, "of all random numbers; default 1");
+  app.add_option("--duration", options.duration_s, "seconds; default: the flight plan's")
+      ->check(CLI::Range(0.01, 1e6));
+  app.add_option("--imu-average", options.imu_average_ms,
+                 "inertial samples are averages over so many ms instead of raw ones; 5 = as PX4 streams them")
+      ->check(CLI::Range(0.5, 100.0));
+  auto* log = app.add_option("-o,--output", options.log, "LCM log to write, as fast as the computer can");
+  auto* live =
+      app.add_option("--live", options.live,
+                     "fly at the pace of the clock and speak MAVLink on a pseudo-terminal, to which this "
+                     "path becomes a symbolic link");
+  live->excludes(log);
+  app.add_option("--speed", options.speed, "--live: times the pace of the clock")
+      ->needs(live)
+      ->check(CLI::Range(0.01, 100.0));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
+  }
+  if (options.log.empty() && options.live.empty()) {
+    return rt::fail(EX_USAGE, rt::Error{"airworthy-sim: --output LOG or --live LINK is needed"});
+  }
+  const auto flight = read_flight(options);
+  if (!flight) return rt::fail(EX_CONFIG, flight.error());
+  signal(SIGINT, request_stop);
+  signal(SIGTERM, request_stop);
+  return options.live.empty() ? run_recorded(options, *flight) : run_live(options, *flight);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {  // memory ran out
+    std::fprintf(stderr, "airworthy-sim: %s\n", error.what());
+    return EX_OSERR;
+  }
+}

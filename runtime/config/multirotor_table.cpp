@@ -1,0 +1,79 @@
+#include "runtime/config/multirotor_table.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+namespace airworthy::rt {
+namespace {
+
+constexpr Range kPositive{1e-12, 1e6};
+constexpr Range kNotNegative{0.0, 1e6};
+constexpr Range kLength_m{-10.0, 10.0};
+constexpr std::size_t kMinRotors = 3;
+
+Rotor read_rotor(ConfigTable table) {
+  Rotor rotor;
+  rotor.position_m = table.required<std::array<double, 3>>("position_m", kLength_m);
+  rotor.spin = table.choice<int>("spin", {{"clockwise", 1}, {"counter_clockwise", -1}});
+  rotor.thrust_axis =
+      table.optional<std::array<double, 3>>("thrust_axis", {0.0, 0.0, -1.0}, Range{-1.0, 1.0});
+  const auto& axis = rotor.thrust_axis;
+  const double norm = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  if (std::abs(norm - 1.0) > 1e-3) {
+    table.fail("thrust_axis", fmt::format("must be a unit vector, has length {:.4g}", norm));
+  } else {
+    for (double& component : rotor.thrust_axis) component /= norm;
+    if (rotor.thrust_axis[2] > -0.5) table.fail("thrust_axis", "must point upward, within 60 degrees of -z");
+  }
+  return rotor;
+}
+
+}  // namespace
+
+Multirotor read_multirotor(ConfigTable table) {
+  Multirotor vehicle;
+  vehicle.mass_kg = table.required<double>("mass_kg", Range{1e-3, 1e3});
+  vehicle.inertia_kg_m2 = table.required<std::array<double, 3>>("inertia_kg_m2", kPositive);
+  vehicle.thrust_coefficient_N_s2 = table.required<double>("thrust_coefficient_N_s2", kPositive);
+  vehicle.torque_ratio_m = table.required<double>("torque_ratio_m", Range{0.0, 1.0});
+  vehicle.propeller_radius_m = table.required<double>("propeller_radius_m", Range{1e-3, 5.0});
+  vehicle.propeller_inertia_kg_m2 = table.required<double>("propeller_inertia_kg_m2", kNotNegative);
+  vehicle.motor_time_constant_s = table.required<double>("motor_time_constant_s", Range{1e-3, 1.0});
+  vehicle.speed_min_rad_s = table.required<double>("speed_min_rad_s", Range{0.0, 1e4});
+  vehicle.speed_max_rad_s = table.required<double>("speed_max_rad_s", Range{1.0, 1e4});
+  if (!(vehicle.speed_max_rad_s > vehicle.speed_min_rad_s)) {
+    table.fail("speed_max_rad_s",
+               fmt::format("{:g} must exceed speed_min_rad_s ({:g})", vehicle.speed_max_rad_s,
+                           vehicle.speed_min_rad_s),
+               {"speed_min_rad_s"});
+  }
+  vehicle.imu_position_m =
+      table.optional<std::array<double, 3>>("imu_position_m", {0.0, 0.0, 0.0}, kLength_m);
+  vehicle.vibration_response =
+      table.optional<std::array<double, 3>>("vibration_response", {1.0, 1.0, 1.0}, Range{0.0, 100.0});
+  vehicle.inflow_ratio = table.optional<double>("inflow_ratio", 0.0, Range{0.0, 100.0});
+  vehicle.rotor_drag_ratio = table.optional<double>("rotor_drag_ratio", 0.0, Range{0.0, 100.0});
+  vehicle.body_drag_N_s2_m2 =
+      table.optional<std::array<double, 3>>("body_drag_N_s2_m2", {0.0, 0.0, 0.0}, kNotNegative);
+  vehicle.gear_height_m = table.required<double>("gear_height_m", Range{1e-3, 10.0});
+  vehicle.gear_radius_m = table.required<double>("gear_radius_m", Range{1e-3, 10.0});
+  const auto rotors = table.tables("rotor", {.count = Count{kMinRotors, kMaxRotors}});
+  for (const ConfigTable& rotor : rotors) {
+    if (vehicle.rotor_count == kMaxRotors) break;  // reported by tables()
+    vehicle.rotor[vehicle.rotor_count++] = read_rotor(rotor);
+  }
+  constexpr double kGravity_m_s2 = 9.81;
+  const double most_thrust_N = static_cast<double>(vehicle.rotor_count) * vehicle.thrust_coefficient_N_s2 *
+                               vehicle.speed_max_rad_s * vehicle.speed_max_rad_s;
+  if (most_thrust_N < vehicle.mass_kg * kGravity_m_s2) {
+    table.fail("speed_max_rad_s",
+               fmt::format("all rotors at full speed lift {:.3g} N, less than the weight of {:.3g} N",
+                           most_thrust_N, vehicle.mass_kg * kGravity_m_s2),
+               {"mass_kg", "thrust_coefficient_N_s2", "speed_min_rad_s", "rotor"});
+  }
+  return vehicle;
+}
+
+}  // namespace airworthy::rt
