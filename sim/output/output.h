@@ -32,8 +32,6 @@ struct Truth {
 class Output {
  public:
   Output() = default;
-  Output(const Output&) = delete;
-  Output& operator=(const Output&) = delete;
   virtual ~Output() = default;
 
   virtual void on_truth(const Truth& truth) = 0;
@@ -42,6 +40,10 @@ class Output {
   virtual void on_attitude(const AutopilotSample& sample) = 0;
   virtual void on_commands(const AutopilotSample& sample) = 0;
   virtual void on_flight_state(const AutopilotSample& sample, LandedState landed_state) = 0;
+
+ protected:
+  Output(const Output&) = default;
+  Output& operator=(const Output&) = default;
 };
 
 }  // namespace airworthy::sim
