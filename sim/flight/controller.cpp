@@ -14,9 +14,15 @@ constexpr double kMostRate_rad_s = 4.0;
 constexpr double kMostYawRate_rad_s = 1.0;
 constexpr double kMostAcceleration_m_s2 = 8.0;
 constexpr double kGyroCutoff_rad_s = 2.0 * 3.14159265358979 * 60.0;
-constexpr double kLead = 2.5;         // the motor's lag is shortened by this much
-constexpr double kDelay_s = 0.012;    // of filters, sampling and commands
-constexpr double kContact_s = 0.1;    // of landing, before the vehicle is held level
+constexpr double kLead = 2.5;       // the motor's lag is shortened by this much
+constexpr double kDelay_s = 0.012;  // of filters, sampling and commands
+constexpr double kContact_s = 0.1;  // of landing, before the vehicle is held level
+// Accelerating a propeller turns the body at once and ten times as hard as its drag does later.
+constexpr double kYawGainRatio = 0.08;
+constexpr double kMostContact_s = 1.0;
+constexpr double kLiftRamp_m_s3 = 2.0;
+constexpr double kMostLift_m_s2 = 5.0;
+constexpr double kMostYawStep_rad = 0.3;
 constexpr double kSpinUp_s = 1.0;     // thrust at take-off rises to its limit within this
 constexpr double kTouchDown_s = 0.5;  // contact before the landing counts
 constexpr double kDisarm_s = 1.5;     // idling after it
@@ -68,11 +74,15 @@ Eigen::Vector3d Controller::wanted_acceleration(const Estimate& estimate, const 
   const Eigen::Vector3d proportional = velocity_gain_ * velocity_error;
   // Standing on the ground before take-off, the error says nothing about the model.
   const bool may_integrate = !estimate.has_contact || reference.manoeuvre == Manoeuvre::kLand;
+  // A vehicle heavier than its file says must still get off.
+  if (estimate.has_contact && reference.manoeuvre == Manoeuvre::kTakeOff) {
+    velocity_integral_.z() = std::max(velocity_integral_.z() - kLiftRamp_m_s3 * kStep_s, -kMostLift_m_s2);
+  }
   Eigen::Vector3d wanted = reference.acceleration_N_m_s2 + proportional + velocity_integral_;
   for (int axis = 0; axis < 3; ++axis) {
     const double limited = std::clamp(wanted[axis], -kMostAcceleration_m_s2, kMostAcceleration_m_s2);
     if (limited == wanted[axis] && may_integrate)
-      velocity_integral_[axis] += 0.4 * velocity_gain_ * proportional[axis] * kStep_s;
+      velocity_integral_[axis] += 0.25 * velocity_gain_ * proportional[axis] * kStep_s;
     wanted[axis] = limited;
   }
   return wanted;
@@ -108,9 +118,12 @@ ControlOutput Controller::fly(const Estimate& estimate, const Reference& referen
   const double horizontal = specific.head<2>().norm();
   if (horizontal > -kMostTilt * specific.z()) specific.head<2>() *= -kMostTilt * specific.z() / horizontal;
 
-  // Thrust is along -z of the body; nose to the north.
+  // Thrust is along -z of the body; the nose turns north in small steps, so that tilt never waits for it.
+  const double yaw_rad = yaw_of(estimate.q_NB);
+  const double heading_rad = yaw_rad - std::clamp(yaw_rad, -kMostYawStep_rad, kMostYawStep_rad);
   const Eigen::Vector3d z_axis = -specific.normalized();
-  const Eigen::Vector3d y_axis = z_axis.cross(Eigen::Vector3d::UnitX()).normalized();
+  const Eigen::Vector3d y_axis =
+      z_axis.cross(Eigen::Vector3d{std::cos(heading_rad), std::sin(heading_rad), 0.0}).normalized();
   Eigen::Matrix3d R_NB;
   R_NB << y_axis.cross(z_axis), y_axis, z_axis;
   output.setpoint_q_NB = Eigen::Quaterniond{R_NB};
@@ -125,7 +138,7 @@ ControlOutput Controller::fly(const Estimate& estimate, const Reference& referen
   Eigen::Quaterniond error = estimate.q_NB.conjugate() * output.setpoint_q_NB;
   if (error.w() < 0.0) error.coeffs() = -error.coeffs();
   Eigen::Vector3d rates = 2.0 * attitude_gain_ * error.vec();
-  rates.z() *= 0.4;
+  rates.z() *= 0.3;
   for (int axis = 0; axis < 3; ++axis) {
     const double most = axis == 2 ? kMostYawRate_rad_s : kMostRate_rad_s;
     rates[axis] = std::clamp(rates[axis], -most, most);
@@ -133,7 +146,7 @@ ControlOutput Controller::fly(const Estimate& estimate, const Reference& referen
   output.setpoint_rates_rad_s = rates;
 
   Eigen::Vector3d angular = rate_gain_ * (rates - gyro_smooth_);
-  angular.z() *= 0.5;
+  angular.z() *= kYawGainRatio;
   if (!estimate.has_contact) rate_integral_ += 0.3 * rate_gain_ * angular * kStep_s;
   rate_integral_ = rate_integral_.cwiseMax(-20.0).cwiseMin(20.0);
   const RotorVector thrusts = mix(thrust_N, inertia_.cwiseProduct(Eigen::Vector3d{angular + rate_integral_}));
@@ -155,7 +168,7 @@ ControlOutput Controller::fly(const Estimate& estimate, const Reference& referen
 
 ControlOutput Controller::step(const Estimate& estimate, const Reference& reference) {
   gyro_smooth_ += (1.0 - std::exp(-kGyroCutoff_rad_s * kStep_s)) * (estimate.gyro_rad_s - gyro_smooth_);
-  contact_s_ = estimate.has_contact ? contact_s_ + kStep_s : std::max(0.0, contact_s_ - kStep_s);
+  contact_s_ = std::clamp(contact_s_ + (estimate.has_contact ? kStep_s : -kStep_s), 0.0, kMostContact_s);
 
   const bool is_landing = reference.manoeuvre == Manoeuvre::kLand;
   if (reference.manoeuvre == Manoeuvre::kTakeOff) has_landed_ = false;
