@@ -74,7 +74,9 @@ rt::Expected<GatewayConfig> GatewayConfig::load(const std::string& path,
   auto file = rt::ConfigFile::load(path, overrides);
   ConfigTable root = file.root();
   GatewayConfig config;
-  config.vehicle = rt::VehicleFile::named_by(root).name;
+  const rt::VehicleFile vehicle = rt::VehicleFile::named_by(root);
+  config.vehicle = vehicle.name;
+  config.multirotor = vehicle.multirotor;
   config.feed = read_feed(root.table("feed"));
   config.health = read_health(root.required_table("health"));
   config.health.vehicle = config.vehicle;

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/vehicle/multirotor.h"
 #include "gateway/feed/feed_config.h"
 #include "gateway/health/health_config.h"
 #include "runtime/config/config_file.h"
@@ -12,6 +14,7 @@ namespace airworthy::gateway {
 /// config/gateway.toml
 struct GatewayConfig {
   std::string vehicle;
+  std::optional<Multirotor> multirotor;  ///< where the vehicle file describes one
   std::string hash;
   FeedConfig feed;
   health::HealthConfig health;

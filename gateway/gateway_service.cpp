@@ -19,6 +19,7 @@ GatewayService::GatewayService(rt::Node& node, const GatewayConfig& config, Feed
       wall_time_known_{wall_time_known},
       ticks_{node.advertise(channel::kTick)},
       health_{node.advertise(channel::kVehicleHealth)} {
+  if (config.multirotor) flight_phase_.emplace(node, *config.multirotor);
   node.subscribe<process_status_t>(channel::kProcessStatus, [this](const process_status_t& message) {
     add(message, "PROCESS_STATUS.meaningless");
   });
@@ -83,8 +84,15 @@ void GatewayService::forward(const fault_event_t& message, bool recovered) {
 }
 
 void GatewayService::on_tick(TimePoint tick) {
-  const auto snapshot = model_.tick(tick);
+  auto snapshot = model_.tick(tick);
   if (!snapshot) return;
+  if (flight_phase_) {
+    // As of the time the snapshot tells, so that what was measured by then has had time to arrive.
+    const Phase phase = flight_phase_->advance_to(snapshot->time).phase();
+    snapshot->flight_phase = name_of(phase);
+    snapshot->changed = snapshot->changed || phase != told_phase_;
+    told_phase_ = phase;
+  }
   // Ticks come a little early and late; and a replay that starts over has its past in the future.
   const bool due = !last_published_ || tick - *last_published_ >= kHealthPeriod - kTickPeriod / 2 ||
                    tick < *last_published_;

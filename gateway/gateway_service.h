@@ -12,6 +12,7 @@
 #include "gateway/feed/feed_time.h"
 #include "gateway/gateway_config.h"
 #include "gateway/health/health_model.h"
+#include "runtime/phase/flight_phase_input.h"
 #include "runtime/process/node.h"
 
 namespace airworthy::gateway {
@@ -48,12 +49,14 @@ class GatewayService {
 
   rt::Node& node_;
   health::HealthModel model_;
+  std::optional<rt::FlightPhaseInput> flight_phase_;  ///< of a multirotor that the vehicle file describes
   FeedPublisher& feed_;
   bool wall_time_known_;
   WallClock wall_clock_;
   rt::Publisher<tick_t> ticks_;
   rt::Publisher<vehicle_health_t> health_;
   EventMemory events_;
+  Phase told_phase_ = Phase::kUnknown;
   std::optional<TimePoint> last_published_;
   std::optional<health::Status> logged_status_;
   std::string logged_root_cause_;

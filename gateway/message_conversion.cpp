@@ -97,8 +97,12 @@ std::optional<ProcessSign> to_input(const process_status_t& message) {
 }
 
 std::optional<LinkReport> to_input(const driver_status_t& message) {
-  return LinkReport{to_origin(message.header), message.link, message.connected != 0, message.detail,
+  LinkReport report{to_origin(message.header), message.link, message.connected != 0, message.detail,
                     message.seconds_since_data};
+  for (const message_rate_t& rate : message.rates) report.rates.push_back({rate.name, rate.rate_Hz});
+  std::sort(report.rates.begin(), report.rates.end(),
+            [](const health::MessageRate& a, const health::MessageRate& b) { return a.name < b.name; });
+  return report;
 }
 
 std::optional<FaultReport> to_input(const fault_event_t& message) {
@@ -154,6 +158,7 @@ vehicle_health_t to_message(const HealthSnapshot& snapshot) {
   vehicle_health_t message{};
   message.vehicle = snapshot.vehicle;
   message.status = static_cast<std::int8_t>(snapshot.status);
+  message.flight_phase = snapshot.flight_phase;
   message.root_cause = snapshot.root_cause;
   message.advice = snapshot.advice;
   for (const ComponentHealth& component : snapshot.components)

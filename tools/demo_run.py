@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Runs the whole system live on a recorded flight: gateway, response detector and MAVLink driver as separate processes, the
-recording played into a pseudo-terminal, and the view of a ground station in this terminal."""
+"""Runs the whole system live: gateway, response detector and MAVLink driver as separate processes, a flight controller on a
+pseudo-terminal, and the view of a ground station in this terminal. The flight controller is that of a simulated hexarotor
+that loses its link for a while and then a propeller, or a recorded flight."""
 import argparse
 import csv
 import json
@@ -10,31 +11,29 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 
 import flight_rig
 
 DATA = pathlib.Path(os.environ.get("AIRWORTHY_DATA", flight_rig.PROJECT.parent / "shared/data"))
-DEFAULT_FLIGHT = "alfa_mavlink/carbonZ_2018-10-05-15-52-12_3_engine_failure_with_emr_traj.tlog.xz"
+VEHICLE = "vehicles/unbalance_hexa.toml"
+SCENARIO = "scenarios/demo.toml"
 
 
 def arguments():
     parser = argparse.ArgumentParser(prog="tools/demo", description=__doc__)
     parser.add_argument("flight", nargs="?", type=pathlib.Path, metavar="TLOG",
-                        help=f"recorded MAVLink, .tlog or .tlog.xz; default {DEFAULT_FLIGHT} in AIRWORTHY_DATA")
+                        help="recorded MAVLink, .tlog or .tlog.xz, instead of the simulated flight")
+    parser.add_argument("--seed", type=int, default=1, help="of the simulated flight")
     parser.add_argument("--speed", type=float, default=1.0, help="times flight pace; vehicle time runs as fast")
-    parser.add_argument("--from", dest="skip", type=float, default=0.0, help="start so many seconds into the flight")
+    parser.add_argument("--from", dest="skip", type=float, default=0.0, help="start so many seconds into a recorded flight")
     parser.add_argument("--json", action="store_true", help="print the feed as lines of JSON instead of the view")
     parser.add_argument("--binaries", type=pathlib.Path, default=flight_rig.PROJECT / "build/dev/bin",
                         help="folder of the built programs")
     given = parser.parse_args()
     if not given.speed > 0:
         parser.error("--speed must be greater than 0")
-    if given.flight is None:
-        given.flight = DATA / DEFAULT_FLIGHT
-        if not given.flight.exists():
-            parser.error(f"no flight data at {DATA}: pass a recorded MAVLink flight (.tlog or .tlog.xz), or set "
-                         "AIRWORTHY_DATA to a folder with the ALFA recordings")
-    if not given.flight.exists():
+    if given.flight is not None and not given.flight.exists():
         parser.error(f"{given.flight}: no such file")
     return given
 
@@ -58,32 +57,53 @@ def check_computer(binaries, lcm_url):
         sys.exit(f"{doctor.stdout}{doctor.stderr}demo: this computer cannot run the system yet; cures above")
 
 
+def onsets_into_flight_s(flight, summary):
+    """Seconds into the flight at which something broke, as far as known."""
+    if flight is None:
+        with open(flight_rig.PROJECT / "config" / SCENARIO, "rb") as file:
+            return {f"{fault['kind']} of " + (f"rotor {fault['rotor']}" if "rotor" in fault else f"the link to the {fault['link']}"):
+                    fault["onset_s"] for fault in tomllib.load(file)["fault"]}
+    onset_us = recorded_onset_utc_us(flight)
+    return {} if onset_us is None else {"failure on record": (onset_us - summary["first_packet_utc_us"]) / 1e6}
+
+
 def report(feed, rig, flight, speed):
-    """What was found, against the record."""
+    """What was found, against the truth."""
     feed.poll(0)
     try:
         summary = json.loads((rig.path / "flight.json").read_text())
     except (OSError, ValueError):
         return
-    onset_us = recorded_onset_utc_us(flight)
+    start_us = summary["start_boottime_us" if flight is None else "first_packet_boottime_us"] * speed
+    onsets = onsets_into_flight_s(flight, summary)
+    for name, onset_s in onsets.items():
+        print(f"demo: {name} at {onset_s:.1f} s of the flight")
     for event in feed.events():
-        flown_us = event["detected_us"] - summary["first_packet_boottime_us"] * speed
-        text = f"demo: {event['component']}: {event['fault_kind']}, {event['severity']}, raised {flown_us / 1e6:.1f} s into the flight"
-        if onset_us is not None:
-            text += f", {(summary['first_packet_utc_us'] + flown_us - onset_us) / 1e6:+.2f} s from the recorded onset"
+        flown_s = (event["detected_us"] - start_us) / 1e6
+        text = f"demo: {event['component']}: {event['fault_kind']}, {event['severity']}, raised {flown_s:.1f} s into the flight"
+        before = [(flown_s - onset_s, name) for name, onset_s in onsets.items() if onset_s <= flown_s]
+        if before:
+            text += f", {min(before)[0]:+.2f} s from the {min(before)[1]}"
         print(text)
     if not feed.events():
-        print("demo: no fault was found in this flight" + ("" if onset_us is None else ", but one is on record"))
+        print("demo: no fault was found in this flight")
 
 
 def run(given):
     with flight_rig.Rig(given.binaries, given.speed) as rig:
         check_computer(given.binaries, rig.lcm_url)
-        rig.start_gateway()
-        rig.start_response()
-        rig.start_driver()
-        feed = flight_rig.Feed(rig.endpoint)
-        flight = rig.start_flight(given.flight, "--start-delay", "2", "--from", str(given.skip))
+        if given.flight is None:
+            rig.start_gateway(config="demo/gateway.toml")
+            rig.start_response([f"vehicle={rig.config / VEHICLE}"], config="response_multirotor.toml")
+            rig.start_driver(config="demo/mavlink.toml")
+            feed = flight_rig.Feed(rig.endpoint)
+            flight = rig.start_simulation(VEHICLE, SCENARIO, "--seed", given.seed)
+        else:
+            rig.start_gateway()
+            rig.start_response()
+            rig.start_driver()
+            feed = flight_rig.Feed(rig.endpoint)
+            flight = rig.start_flight(given.flight, "--start-delay", "2", "--from", given.skip)
         watch = subprocess.Popen([given.binaries / "airworthy-watch", rig.endpoint, *(["--json"] if given.json else [])],
                                  stdin=subprocess.DEVNULL, preexec_fn=flight_rig.die_with_parent)
         rig.running["watch"] = watch

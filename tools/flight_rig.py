@@ -69,16 +69,23 @@ class Rig:
             command += ["--set", override]
         return self.start(name, command)
 
-    def start_gateway(self, overrides=()):
-        return self.start_service("airworthy-gateway", "gateway.toml",
+    def start_gateway(self, overrides=(), config="gateway.toml"):
+        return self.start_service("airworthy-gateway", config,
                                   [f'feed.endpoint="{self.endpoint}"', *overrides])
 
-    def start_response(self, overrides=()):
-        return self.start_service("airworthy-response", "response.toml", overrides)
+    def start_response(self, overrides=(), config="response.toml"):
+        return self.start_service("airworthy-response", config, overrides)
 
-    def start_driver(self, overrides=()):
-        return self.start_service("airworthy-mavlink", "mavlink.toml",
+    def start_driver(self, overrides=(), config="mavlink.toml"):
+        return self.start_service("airworthy-mavlink", config,
                                   [f'link="serial:{self.terminal}:57600"', *overrides], clock="live")
+
+    def start_simulation(self, vehicle, scenario, *options):
+        """Flies a simulated vehicle; its JSON summary is in <folder>/flight.json when it has ended."""
+        with open(self.path / "flight.json", "wb") as output:
+            return self.start("flight", [self.binaries / "airworthy-sim", "--vehicle", self.config / vehicle, "--scenario",
+                                         self.config / scenario, "--live", self.terminal, "--speed", self.speed, "--json",
+                                         *options], output)
 
     def start_flight(self, flight, *options):
         """Plays a recording; its JSON summary is in <folder>/flight.json when it has ended."""

@@ -1,5 +1,7 @@
 #include "cli/sim/live.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -19,6 +21,9 @@ rt::Expected<LiveFlight> fly_live(const Flight& flight, const std::filesystem::p
                             flight.vehicle.multirotor->rotor_count};
   sim::Simulation simulation{*flight.vehicle.multirotor, flight.scenario, flight.realism, flight.seed};
   LiveFlight result;
+  timespec boottime{};
+  clock_gettime(CLOCK_BOOTTIME, &boottime);
+  result.start_boottime_us = boottime.tv_sec * 1'000'000 + boottime.tv_nsec / 1000;
   const Clock::time_point start = Clock::now();
   while (simulation.time_s() < flight.duration_s) {
     const auto due = start + std::chrono::duration_cast<Clock::duration>(

@@ -10,6 +10,7 @@
 namespace airworthy::sim_command {
 
 struct LiveFlight {
+  std::int64_t start_boottime_us = 0;  ///< CLOCK_BOOTTIME at time 0 of the flight
   double flown_s = 0.0;
   std::int64_t writes_dropped = 0;  ///< frames that nobody read
   double most_behind_s = 0.0;       ///< how late the simulation was at worst

@@ -9,6 +9,7 @@
 #include <exception>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ struct Options {
   std::string log;
   std::string live;
   double speed = 1.0;
+  bool json = false;
 };
 
 volatile sig_atomic_t stop_requested = 0;
@@ -78,6 +80,14 @@ int run_live(const Options& options, const sim_command::Flight& flight) {
   const auto flown =
       sim_command::fly_live(flight, options.live, options.speed, progress_bar(flight.duration_s));
   if (!flown) return rt::fail(EX_UNAVAILABLE, flown.error());
+  if (options.json) {
+    const nlohmann::json summary{{"start_boottime_us", flown->start_boottime_us},
+                                 {"flown_s", flown->flown_s},
+                                 {"frames_not_read", flown->writes_dropped},
+                                 {"most_behind_s", flown->most_behind_s}};
+    fmt::print("{}\n", summary.dump());
+    return EX_OK;
+  }
   fmt::print("flown {:.1f} s, {} frames not read, at most {:.0f} ms behind the clock\n", flown->flown_s,
              flown->writes_dropped, flown->most_behind_s * 1e3);
   return EX_OK;
@@ -91,6 +101,13 @@ int run_recorded(const Options& options, const sim_command::Flight& flight) {
   if (recording->stopped) return rt::fail(EX_TEMPFAIL, rt::Error{"airworthy-sim: stopped, no log written"});
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   const auto bytes = static_cast<double>(std::filesystem::file_size(options.log));
+  if (options.json) {
+    const nlohmann::json summary{
+        {"log", options.log}, {"vehicle", flight.vehicle.name}, {"duration_s", flight.duration_s},
+        {"bytes", bytes},     {"elapsed_s", elapsed.count()},   {"messages", recording->messages}};
+    fmt::print("{}\n", summary.dump());
+    return EX_OK;
+  }
   fmt::print("{}: {:.1f} s, {:.1f} MB ({:.2f} MB per minute), {:.0f} times real time\n", options.log,
              flight.duration_s, bytes * 1e-6, bytes * 1e-6 * 60.0 / flight.duration_s,
              flight.duration_s / elapsed.count());
@@ -122,6 +139,7 @@ int run(int argc, char** argv) {
                      "fly at the pace of the clock and speak MAVLink on a pseudo-terminal, to which this "
                      "path becomes a symbolic link");
   live->excludes(log);
+  app.add_flag("--json", options.json, "print the summary as one line of JSON");
   app.add_option("--speed", options.speed, "--live: times the pace of the clock")
       ->needs(live)
       ->check(CLI::Range(0.01, 100.0));

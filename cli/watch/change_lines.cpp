@@ -25,6 +25,7 @@ std::vector<std::string> ChangeLines::add(const HealthView& view) {
   const auto put = [&](const std::string& subject, const std::string& state, const std::string& detail) {
     now[subject] = {state + "\n" + detail, with(subject + " " + state, detail)};
   };
+  if (!view.flight_phase.empty()) put("flight phase", view.flight_phase, "");
   for (const ComponentView& c : view.components) {
     put("component " + c.name, c.status, join(c.reasons));
     // The text of a fault follows its numbers; the fault has lines of its own.

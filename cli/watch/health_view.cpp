@@ -101,6 +101,7 @@ HealthView health_view(const json& body) {
   view.vehicle = text(body, "vehicle");
   view.utc = text(body, "time_utc");
   view.status = text(body, "status");
+  view.flight_phase = text(body, "flight_phase");
   view.root_cause = text(body, "root_cause");
   view.advice = text(body, "advice");
   for_each(body, "components", [&](const json& item) {
@@ -122,8 +123,14 @@ HealthView health_view(const json& body) {
                               text(item, "detail")});
   });
   for_each(body, "links", [&](const json& item) {
-    view.links.push_back({text(item, "driver"), text(item, "link"), text(item, "status"),
-                          since(item, "since", now_us), text(item, "detail")});
+    LinkView link{text(item, "driver"), text(item, "link"), text(item, "status"),
+                  since(item, "since", now_us), text(item, "detail")};
+    for_each(item, "rates", [&](const json& rate) {
+      const json* value = member(rate, "rate_Hz");
+      if (value == nullptr || !value->is_number() || value->get<double>() <= 0.0) return;
+      link.rates.push_back(fmt::format("{} {:.3g} Hz", text(rate, "name"), value->get<double>()));
+    });
+    view.links.push_back(std::move(link));
   });
   for_each(body, "faults", [&](const json& item) { view.faults.push_back(fault_view(item, now_us)); });
   return view;

@@ -38,6 +38,7 @@ struct LinkView {
   std::string status;
   Since since;
   std::string detail;
+  std::vector<std::string> rates{};  ///< "HIGHRES_IMU 500 Hz", of what arrives
 };
 
 struct FaultView {
@@ -59,6 +60,7 @@ struct HealthView {
   std::string vehicle;
   std::string utc;
   std::string status;
+  std::string flight_phase;
   std::string root_cause;
   std::string advice;
   std::vector<ComponentView> components;

@@ -137,6 +137,21 @@ void add_components(Lines& lines, const HealthView& health) {
   if (health.components.empty()) lines.add("  none: no detector has reported");
 }
 
+/// The rates of a link, as many to a line as fit.
+void add_rates(Lines& lines, const LinkView& link) {
+  constexpr std::size_t kLine = 76;
+  const std::string indent(4, ' ');
+  std::string line;
+  for (const std::string& rate : link.rates) {
+    if (!line.empty() && indent.size() + line.size() + 2 + rate.size() > kLine) {
+      lines.add(kGrey, indent + line, "");
+      line.clear();
+    }
+    line += (line.empty() ? "" : ", ") + rate;
+  }
+  if (!line.empty()) lines.add(kGrey, indent + line, "");
+}
+
 void add_processes_and_links(Lines& lines, const HealthView& health) {
   lines.heading(fmt::format("PROCESSES ({})", health.processes.size()));
   const std::size_t width = width_of(health.processes, [](const ProcessView& p) { return p.name; });
@@ -152,6 +167,7 @@ void add_processes_and_links(Lines& lines, const HealthView& health) {
   for (const LinkView& link : health.links) {
     const std::string detail = link.driver + (link.detail.empty() ? "" : ": " + link.detail);
     add_row(lines, link.status, link.name, link_width, link.since, detail);
+    add_rates(lines, link);
   }
 }
 
@@ -189,10 +205,14 @@ std::vector<std::string> screen(const std::optional<HealthView>& health, const F
     add_feed(lines, feed);
     return lines.take(rows);
   }
+  std::string phase = health->flight_phase;
+  std::replace(phase.begin(), phase.end(), '_', ' ');
+  const bool has_phase = !phase.empty() && phase != "unknown";
   // An old status must not look like a present one.
   const std::string_view code = feed.silent_s ? kGrey : colour_of(health->status);
   lines.add(code, fmt::format("{}  {}", health->vehicle, upper(health->status)),
-            (health->root_cause.empty() ? "" : "  root cause: " + health->root_cause) +
+            (has_phase ? "  " + phase : "") +
+                (health->root_cause.empty() ? "" : "  root cause: " + health->root_cause) +
                 (health->advice.empty() ? "" : "  " + health->advice));
   lines.add(kGrey, health->utc, "");
   add_feed(lines, feed);

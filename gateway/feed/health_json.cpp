@@ -37,6 +37,11 @@ json to_json(const health::LinkHealth& link, const FeedTime& time) {
               {"link", link.link},
               {"status", to_word(link.status)},
               {"detail", link.detail}};
+  json rates = json::array();
+  for (const health::MessageRate& rate : link.rates) {
+    rates.push_back({{"name", rate.name}, {"rate_Hz", number(rate.rate_Hz)}});
+  }
+  object["rates"] = std::move(rates);
   time.write(object, "since", link.since);
   return object;
 }
@@ -154,6 +159,7 @@ json to_json(const health::HealthSnapshot& snapshot, const FeedTime& time) {
     faults.back()["unconfirmed"] = fault.unconfirmed;
   }
   json object{{"status", to_word(snapshot.status)},
+              {"flight_phase", snapshot.flight_phase},
               {"root_cause", snapshot.root_cause},
               {"advice", snapshot.advice},
               {"components", list(snapshot.components, time)},

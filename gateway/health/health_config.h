@@ -21,6 +21,7 @@ struct HealthLimits {
   std::size_t faults_per_report = 64;
   std::size_t cleared_faults =
       512;  ///< remembered, so that an event overtaken by its clear does not raise again
+  std::size_t rates_per_link = 64;
   std::size_t candidates_per_fault = 8;
   std::size_t evidence_per_fault = 16;
   std::size_t reasons_per_component = 8;

@@ -27,6 +27,12 @@ struct ProcessSign {
   std::string detail;
 };
 
+/// How often one kind of device message arrives.
+struct MessageRate {
+  std::string name;
+  double rate_Hz{};  ///< NaN where unknown
+};
+
 /// State of one link, as its driver reports it.
 struct LinkReport {
   Origin origin;
@@ -34,6 +40,7 @@ struct LinkReport {
   bool connected{};
   std::string detail;
   double seconds_since_data{};  ///< NaN before the first byte
+  std::vector<MessageRate> rates{};
 };
 
 enum class FaultPhase { kRaise = 1, kUpdate, kClear };

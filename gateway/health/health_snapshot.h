@@ -40,6 +40,7 @@ struct LinkHealth {
   LinkStatus status{LinkStatus::kUnknown};
   TimePoint since{};  ///< of a silent link: its last data
   std::string detail;
+  std::vector<MessageRate> rates;  ///< by name; of the last report
 };
 
 struct ActiveFault {
@@ -53,7 +54,8 @@ struct HealthSnapshot {
   TimePoint time{};
   std::string vehicle;
   Status status{Status::kUnknown};
-  std::string root_cause;  ///< component, process or link that explains the rest; empty when ok
+  std::string flight_phase{"unknown"};  ///< as name_of(Phase) has it
+  std::string root_cause;               ///< component, process or link that explains the rest; empty when ok
   std::string advice;
   std::vector<ComponentHealth> components;  ///< by name
   std::vector<ProcessHealth> processes;     ///< by name

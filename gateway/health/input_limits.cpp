@@ -30,6 +30,11 @@ class Bounder {
       report.seconds_since_data = kNaN;
     }
     report.seconds_since_data = std::min(report.seconds_since_data, 1e9);
+    cut(report.rates, limits_.rates_per_link);
+    for (MessageRate& rate : report.rates) {
+      name(rate.name);
+      if (!(rate.rate_Hz >= 0.0 && rate.rate_Hz < 1e9)) rate.rate_Hz = kNaN;
+    }
   }
 
   void operator()(FaultReport& fault) {

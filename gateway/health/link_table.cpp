@@ -35,6 +35,7 @@ void LinkTable::apply(const LinkReport& report, Relation relation, bool foreign_
   link.connected = report.connected;
   link.detail = report.detail;
   link.seconds_since_data = report.seconds_since_data;
+  link.rates = report.rates;
 }
 
 void LinkTable::judge_one(const std::string& driver, Link& link, TimePoint as_of, TimePoint grace_from,
@@ -83,7 +84,7 @@ void LinkTable::rebase(TimePoint as_of) {
 std::vector<LinkHealth> LinkTable::list() const {
   std::vector<LinkHealth> list;
   for (const auto& [key, link] : links_) {
-    list.push_back({key.first, key.second, link.status, link.since, link.judged_detail});
+    list.push_back({key.first, key.second, link.status, link.since, link.judged_detail, link.rates});
   }
   return list;
 }

@@ -29,6 +29,7 @@ class LinkTable {
     bool connected{};
     std::string detail;
     double seconds_since_data{};
+    std::vector<MessageRate> rates;
 
     LinkStatus status{LinkStatus::kUnknown};
     TimePoint since{};

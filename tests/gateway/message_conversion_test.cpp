@@ -137,7 +137,7 @@ TEST(MessageConversion, VehicleHealthUsesTheNumbersOfTheMessage) {
   snapshot.processes = {
       {"p", true, ProcessStatus::kMissing, from_us(1), from_us(2), 7, 2, "no life sign"},
       {"q", true, ProcessStatus::kNeverSeen, from_us(0), std::nullopt, std::nullopt, 0, ""}};
-  snapshot.links = {{"p", "udp:1", LinkStatus::kDown, from_us(3), "gone"}};
+  snapshot.links = {{"p", "udp:1", LinkStatus::kDown, from_us(3), "gone", {}}};
   const vehicle_health_t message = to_message(snapshot);
   EXPECT_EQ(message.status, 3);
   ASSERT_EQ(message.component_count, 1);

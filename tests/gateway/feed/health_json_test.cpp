@@ -55,10 +55,16 @@ TEST(HealthJson, Snapshot) {
   snapshot.processes = {
       {"p", true, ProcessStatus::kMissing, from_us(1), from_us(1), 7, 2, "no life sign"},
       {"q", true, ProcessStatus::kNeverSeen, from_us(0), std::nullopt, std::nullopt, 0, ""}};
-  snapshot.links = {{"p", "udp:1", LinkStatus::kSilent, from_us(3), "open, but silent"}};
+  snapshot.links = {{"p",
+                     "udp:1",
+                     LinkStatus::kSilent,
+                     from_us(3),
+                     "open, but silent",
+                     {{"IMU", 99.5}, {"X", std::nan("")}}}};
+  snapshot.flight_phase = "in_flight";
   snapshot.faults = {{fault(), "p is missing"}};
   auto expected = nlohmann::json::parse(R"({
-    "time_us": 100, "time_utc": null, "status": "failed", "root_cause": "rotor 2", "advice": "Land now.",
+    "time_us": 100, "time_utc": null, "status": "failed", "flight_phase": "in_flight", "root_cause": "rotor 2", "advice": "Land now.",
     "components": [{"component": "rotor 2", "status": "failed", "since_us": 6, "since_utc": null,
                     "reasons": ["response: weak"], "advice": "Land now."}],
     "processes": [
@@ -66,7 +72,8 @@ TEST(HealthJson, Snapshot) {
        "last_seen_utc": null, "session": 7, "restarts": 2, "detail": "no life sign"},
       {"process": "q", "expected": true, "status": "never_seen", "since_us": 0, "since_utc": null,
        "last_seen_us": null, "last_seen_utc": null, "session": null, "restarts": 0, "detail": ""}],
-    "links": [{"driver": "p", "link": "udp:1", "status": "silent", "since_us": 3, "since_utc": null,
+    "links": [{"driver": "p", "link": "udp:1", "status": "silent",
+               "rates": [{"name": "IMU", "rate_Hz": 99.5}, {"name": "X", "rate_Hz": null}], "since_us": 3, "since_utc": null,
                "detail": "open, but silent"}]})");
   expected["faults"] = nlohmann::json::array({nlohmann::json::parse(kFault)});
   expected["faults"][0]["unconfirmed"] = "p is missing";
