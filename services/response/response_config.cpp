@@ -125,9 +125,9 @@ ChannelMeaning read_meaning(ConfigTable table, Signal response) {
   meaning.name = table.required<std::string>("name");
   meaning.component = table.required<std::string>("component");
   meaning.fault_kind = table.required<std::string>("fault_kind");
-  meaning.severity = table.choice<Severity>(
-      "severity",
-      {{"advisory", Severity::kAdvisory}, {"caution", Severity::kCaution}, {"warning", Severity::kWarning}});
+  meaning.severity = table.choice<rt::Severity>("severity", {{"advisory", rt::Severity::kAdvisory},
+                                                             {"caution", rt::Severity::kCaution},
+                                                             {"warning", rt::Severity::kWarning}});
   meaning.summary = table.required<std::string>("summary");
   meaning.candidates = table.optional<std::vector<std::string>>("candidates", {});
   meaning.unit = unit_of(response);

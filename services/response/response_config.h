@@ -5,18 +5,16 @@
 
 #include "core/detectors/response/response_monitor.h"
 #include "runtime/config/config_file.h"
+#include "runtime/detector/fault_reporter.h"
 
 namespace airworthy::response {
-
-/// How urgent a fault is, and with that the advice the ground gives.
-enum class Severity : std::int8_t { kAdvisory = 1, kCaution = 2, kWarning = 3 };
 
 /// What an alarm of a channel means, in words.
 struct ChannelMeaning {
   std::string name;
   std::string component;
   std::string fault_kind;
-  Severity severity = Severity::kCaution;
+  rt::Severity severity = rt::Severity::kCaution;
   std::string summary;
   std::string unit;  ///< of the response
   std::vector<std::string> candidates;

@@ -106,14 +106,14 @@ void ResponseMonitor::on_clock(TimePoint now) noexcept {
   silent_ = started_ && now - last_sample_ > params_.longest_gap;
 }
 
-MonitorState ResponseMonitor::state() const noexcept {
-  if (!started_) return MonitorState::kInitialising;
-  if (muted() != Muted::kNo) return MonitorState::kMuted;
+DetectorState ResponseMonitor::state() const noexcept {
+  if (!started_) return DetectorState::kInitialising;
+  if (muted() != Muted::kNo) return DetectorState::kMuted;
   const auto verdicts_now = verdicts();
   const bool judging =
       std::any_of(verdicts_now.begin(), verdicts_now.end(),
                   [](const ChannelVerdict& verdict) { return verdict.reason == NotJudged::kJudged; });
-  return judging ? MonitorState::kMonitoring : MonitorState::kConverging;
+  return judging ? DetectorState::kMonitoring : DetectorState::kConverging;
 }
 
 // A sample of what sets the pace; false where it is the first one, also after a gap.

@@ -4,6 +4,7 @@
 #include <limits>
 #include <span>
 
+#include "core/detectors/detector_state.h"
 #include "core/detectors/response/arx_channel.h"
 #include "core/detectors/response/response_channel.h"
 #include "core/estimators/attitude_propagator.h"
@@ -36,7 +37,6 @@ struct MonitorParams {
   double airspeed_sensor_above_m_s = 3.0;   ///< an airspeed sensor that works reads more than this in flight
 };
 
-enum class MonitorState : std::uint8_t { kInitialising = 0, kConverging = 1, kMonitoring = 2, kMuted = 3 };
 enum class Muted : std::uint8_t { kNo, kNotFlying, kInputStale };
 
 struct ImuSample {
@@ -81,7 +81,7 @@ class ResponseMonitor {
   /// Evidence is not touched, so the verdicts never depend on how ticks and samples interleave.
   void on_clock(TimePoint now) noexcept;
 
-  [[nodiscard]] MonitorState state() const noexcept;
+  [[nodiscard]] DetectorState state() const noexcept;
   [[nodiscard]] Muted muted() const noexcept { return silent_ ? Muted::kInputStale : muted_; }
   [[nodiscard]] TimePoint tick_time() const noexcept { return tick_time_; }
   [[nodiscard]] std::span<const ChannelVerdict> verdicts() const noexcept {

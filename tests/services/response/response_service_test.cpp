@@ -31,7 +31,7 @@ ResponseConfig thrust_config() {
   config.channels.push_back({.name = "thrust",
                              .component = "engine",
                              .fault_kind = "thrust_loss",
-                             .severity = Severity::kWarning,
+                             .severity = rt::Severity::kWarning,
                              .summary = "too slow",
                              .unit = "m/s^2",
                              .candidates = {"engine", "propeller"}});

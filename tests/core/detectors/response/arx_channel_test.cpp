@@ -287,7 +287,7 @@ TEST(ArxChannel, EverySetpointIsASampleOrOnlyAFreshAttitude) {
   const int to_fresh = again.arm(fresh);
   EXPECT_GE(to_fresh, 8 * 202);
   EXPECT_LE(to_fresh, 8 * 400);
-  EXPECT_EQ(fresh.state(), MonitorState::kMonitoring);
+  EXPECT_EQ(fresh.state(), DetectorState::kMonitoring);
 }
 
 TEST(ArxChannel, StandsBesideARegressionInOneMonitor) {

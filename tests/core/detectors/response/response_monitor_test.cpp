@@ -121,7 +121,7 @@ TEST(ResponseMonitor, FindsAThrustLossWithinTwoSeconds) {
     EXPECT_GE(found[0].at_s, 60.0);
     EXPECT_LE(found[0].at_s, 62.0) << "seed " << seed;
     EXPECT_NEAR(found[0].onset_s, 60.0, 0.6) << "seed " << seed;
-    EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+    EXPECT_EQ(monitor.state(), DetectorState::kMonitoring);
   }
 }
 
@@ -170,7 +170,7 @@ TEST(ResponseMonitor, SilentInAnHourOfHealthyFlight) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     ResponseMonitor monitor{thrust_only()};
     EXPECT_TRUE(Flight{seed}.fly(monitor, 600.0).empty()) << "seed " << seed;
-    EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+    EXPECT_EQ(monitor.state(), DetectorState::kMonitoring);
   }
 }
 
@@ -314,7 +314,7 @@ TEST(ResponseMonitor, TheAttitudeMaySetThePace) {
       if (!monitor.on_attitude(time, roll, 0.0)) continue;
       if (monitor.verdicts()[0].transition == Transition::kRaise) raised_s = t;
     }
-    EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+    EXPECT_EQ(monitor.state(), DetectorState::kMonitoring);
     EXPECT_EQ(raised_s.has_value(), fails);
     if (raised_s) {
       EXPECT_GE(*raised_s, 70.0);
@@ -375,15 +375,15 @@ TEST(ResponseMonitor, SilenceMutesAndHeals) {
   Flight flight{6};
   (void)flight.fly(monitor, 60.0);
   monitor.on_clock(flight.start + from_seconds(60.5));
-  EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+  EXPECT_EQ(monitor.state(), DetectorState::kMonitoring);
   monitor.on_clock(flight.start + from_seconds(61.5));
-  EXPECT_EQ(monitor.state(), MonitorState::kMuted);
+  EXPECT_EQ(monitor.state(), DetectorState::kMuted);
   EXPECT_EQ(monitor.muted(), Muted::kInputStale);
   Flight later{7};
   later.start = flight.start + from_seconds(90.0);
   EXPECT_TRUE(later.fly(monitor, 30.0).empty()) << "a gap is not a fault";
   EXPECT_EQ(monitor.gaps(), 1);
-  EXPECT_EQ(monitor.state(), MonitorState::kMonitoring);
+  EXPECT_EQ(monitor.state(), DetectorState::kMonitoring);
 }
 
 TEST(ResponseMonitor, MutedWhileNotFlying) {
@@ -392,7 +392,7 @@ TEST(ResponseMonitor, MutedWhileNotFlying) {
   flight.groundspeed_m_s = 1.0;
   flight.fault_at_s = 60.0;
   EXPECT_TRUE(flight.fly(monitor, 70.0).empty());
-  EXPECT_EQ(monitor.state(), MonitorState::kMuted);
+  EXPECT_EQ(monitor.state(), DetectorState::kMuted);
   EXPECT_EQ(monitor.muted(), Muted::kNotFlying);
 }
 
@@ -412,7 +412,7 @@ TEST(ResponseMonitor, MissingAttitudeIsNotJudged) {
     (void)monitor.on_imu({from_us(1'000'000 + i * 100'000), {normal(random), 0, -9.81}, {0, 0, 0}});
   }
   EXPECT_EQ(monitor.verdicts()[0].reason, NotJudged::kInputUnknown);
-  EXPECT_EQ(monitor.state(), MonitorState::kConverging);
+  EXPECT_EQ(monitor.state(), DetectorState::kConverging);
 }
 
 TEST(ResponseMonitor, UsesNoHeap) {
