@@ -40,7 +40,8 @@ class DenseMatrix {
     }
   }
 
-  friend DenseMatrix operator*(const DenseMatrix& a, const DenseMatrix& b) {
+  // Not inlined: g++ 12 otherwise warns of indices that the sizes exclude.
+  [[gnu::noinline]] friend DenseMatrix operator*(const DenseMatrix& a, const DenseMatrix& b) {
     DenseMatrix product{a.rows_, b.columns_};
     for (int i = 0; i < a.rows_; ++i) {
       for (int j = 0; j < b.columns_; ++j) {
