@@ -23,7 +23,7 @@ namespace airworthy {
 ///   Covariance  P_x = P̃ + V·P_γ·Vᵀ;  cov(x, γ) = V·P_γ                                                 (7)
 ///   Source      the equations W, V⁻, H, V, x̂, P of multi-stage joint fault observers as they are usually printed;
 ///               derived, made exact for qⱼ > 0 and cast into (2) to (7) in docs/equations/actuator.md
-///   Symbols     γⱼ: lost part of actuator j, 0 healthy, 1 dead; Y = P_γ⁻¹ → information_; P̃ → head_; V → coupling_
+///   Symbols     γⱼ: lost part of actuator j, 0 healthy, 1 dead; Y = P_γ⁻¹ → information; P̃ → head; V → coupling
 ///   Deviations  x̂ itself is kept instead of the fault-free x̃ = x̂ − V·γ̂; the noise of γ enters one actuator at a
 ///               time, (3), which needs no inverse of P_γ
 ///   Errata      docs/equations/actuator.md#errata: as printed it is exact for q = 0 alone
