@@ -36,14 +36,24 @@ std::string reason_of(NotJudged reason, double sigma) {
   return "";
 }
 
-std::vector<evidence_t> evidence_of(const LossVerdict& verdict) {
+// With `nis` of the rotors' observer, 4 on average if its model holds.
+std::vector<evidence_t> evidence_of_rotor(const LossVerdict& verdict, double nis) {
   using rt::evidence;
   return {evidence("loss", verdict.gamma, "1"),
           evidence("loss_sigma", verdict.sigma, "1"),
           evidence("baseline", verdict.baseline, "1"),
           evidence("judged_loss", verdict.test_gamma, "1"),
           evidence("judged_loss_sigma", verdict.test_sigma, "1"),
-          evidence("log_likelihood_lead", verdict.lead, "1")};
+          evidence("log_likelihood_lead", verdict.lead, "1"),
+          evidence("nis", nis, "1")};
+}
+
+std::vector<evidence_t> evidence_of_axis(const LossVerdict& verdict, const AxisState& state,
+                                         std::size_t axis) {
+  const char* const unit = axis == kHeight ? "m/s^2" : "rad/s^2";
+  using rt::evidence;
+  return {evidence("loss", verdict.gamma, "1"), evidence("loss_sigma", verdict.sigma, "1"),
+          evidence("commanded", state.commanded, unit), evidence("disturbance", state.disturbance, unit)};
 }
 
 std::vector<std::string> names_of(std::uint32_t rotors) {
@@ -123,7 +133,7 @@ void ActuatorService::report_rotor(std::size_t rotor, const LossVerdict& verdict
     fault.summary = fmt::format("one rotor has lost about {:.0f} % of its thrust; most likely rotor {}",
                                 100.0 * verdict.test_gamma, rotor + 1);
   }
-  fault.evidence = evidence_of(verdict);
+  fault.evidence = evidence_of_rotor(verdict, monitor_.nis());
   reporter_.report(rotor, verdict.transition, monitor_.time(), fault);
 }
 
@@ -140,7 +150,7 @@ void ActuatorService::report_axis(std::size_t axis, const LossVerdict& verdict) 
   fault.onset = verdict.onset;
   fault.summary = fmt::format("{}: {:.0f} ± {:.0f} % of what is commanded does not come", kAxisNames[axis],
                               100.0 * verdict.gamma, 100.0 * verdict.sigma);
-  fault.evidence = evidence_of(verdict);
+  fault.evidence = evidence_of_axis(verdict, monitor_.axis_states()[axis], axis);
   reporter_.report(kMaxRotors + axis, verdict.transition, monitor_.time(), fault);
 }
 
@@ -185,13 +195,14 @@ rt::DetectorReport ActuatorService::report() const {
   if (report.state == DetectorState::kMuted) report.muted_reason = reason_of(monitor_.reason(), 0.0);
   const auto rotors = monitor_.rotors();
   for (std::size_t i = 0; i < rotors.size(); ++i) {
-    report.components.push_back(rt::assessment(
-        rotor_name(i), reason_of(rotors[i].reason, rotors[i].test_sigma), evidence_of(rotors[i])));
+    report.components.push_back(rt::assessment(rotor_name(i),
+                                               reason_of(rotors[i].reason, rotors[i].test_sigma),
+                                               evidence_of_rotor(rotors[i], monitor_.nis())));
   }
   for (std::size_t i = 0; i < kAxes; ++i) {
     const LossVerdict& axis = monitor_.axes()[i];
-    report.components.push_back(
-        rt::assessment(kAxisNames[i], reason_of(axis.reason, axis.sigma), evidence_of(axis)));
+    report.components.push_back(rt::assessment(kAxisNames[i], reason_of(axis.reason, axis.sigma),
+                                               evidence_of_axis(axis, monitor_.axis_states()[i], i)));
   }
   node_.counters()["samples_refused"] = monitor_.refused();
   return report;

@@ -141,8 +141,6 @@ class ActuatorMonitor {
   }
   [[nodiscard]] const std::array<LossVerdict, kAxes>& axes() const noexcept { return axis_verdicts_; }
   [[nodiscard]] const std::array<AxisState, kAxes>& axis_states() const noexcept { return axis_states_; }
-  [[nodiscard]] bool uses_speeds() const noexcept { return thrust_.uses_speeds(); }
-  [[nodiscard]] double thrust_ratio() const noexcept { return thrust_ratio_; }
   [[nodiscard]] double nis() const noexcept { return innovation_.nis; }
   [[nodiscard]] std::int64_t refused() const noexcept { return refused_; }
 

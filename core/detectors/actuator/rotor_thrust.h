@@ -68,7 +68,6 @@ class RotorThrust {
     const bool speeds = is_fresh(measured_at_, now) && source_ != InputSource::kCommand;
     const bool commands = is_fresh(commanded_at_, now) && source_ != InputSource::kSpeed;
     is_known_ = speeds || commands;
-    uses_speeds_ = speeds;
     const double share = 1.0 - std::exp(-dt_s / vehicle_.motor_time_constant_s);
     const double correction = speeds && commands ? 1.0 - std::exp(-dt_s / kCorrection_s) : 0.0;
     const double momentum = angular_momentum_N_m_s();
@@ -86,7 +85,6 @@ class RotorThrust {
   [[nodiscard]] Speeds take_missed_m_s() noexcept { return std::exchange(missed_m_s_, {}); }
 
   [[nodiscard]] bool is_known() const noexcept { return is_known_; }
-  [[nodiscard]] bool uses_speeds() const noexcept { return uses_speeds_; }
   [[nodiscard]] double speed_rad_s(std::size_t rotor) const noexcept {
     return ratio_[rotor] * modelled_[rotor];
   }
@@ -136,7 +134,6 @@ class RotorThrust {
   }();
   double torque_N_m_ = 0.0;
   bool is_known_ = false;
-  bool uses_speeds_ = false;
 };
 
 }  // namespace airworthy::actuator
