@@ -97,23 +97,23 @@ Multirotor Simulation::perturbed(const Multirotor& nominal, const Realism& reali
 }
 
 Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, const Realism& realism,
-                       std::uint64_t seed)
+                       Seeds seeds)
     : realism_{realism},
       scenario_{scenario},
       number_of_{order_by_position(nominal)},
       place_of_{},
-      dynamics_{perturbed(nominal, realism, seed)},
+      dynamics_{perturbed(nominal, realism, seeds.vehicle)},
       hover_thrust_N_{dynamics_.vehicle().mass_kg * kGravity_m_s2},
-      plan_{scenario, Random{seed, "set-points"}},
+      plan_{scenario, Random{seeds.flight, "set-points"}},
       controller_{reordered(nominal)},
-      gusts_{steady_wind(realism, seed), Random{seed, "gusts"}},
+      gusts_{steady_wind(realism, seeds.flight), Random{seeds.flight, "gusts"}},
       imu_{realism.imu,
            {nominal.imu_position_m[0], nominal.imu_position_m[1], nominal.imu_position_m[2]},
            kPhysicsStep_s,
-           seed},
-      esc_{realism.esc, nominal.rotor_count, seed},
-      loss_{seed, "autopilot loss"},
-      desync_{seed, "desync"},
+           seeds.flight},
+      esc_{realism.esc, nominal.rotor_count, seeds.flight},
+      loss_{seeds.flight, "autopilot loss"},
+      desync_{seeds.flight, "desync"},
       command_delay_steps_{
           static_cast<std::size_t>(std::lround(realism.motor.command_latency_s / kControlStep_s))},
       state_{dynamics_.at_rest()},
@@ -125,16 +125,16 @@ Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, cons
   for (std::size_t place = 0; place < kMaxRotors; ++place) place_of_[number_of_[place]] = place;
   for (std::uint64_t axis = 0; axis < 3; ++axis) {
     attitude_error_.emplace_back(realism.autopilot.attitude_noise_rad, kAttitudeErrorTime_s,
-                                 Random{seed, "attitude", axis});
+                                 Random{seeds.flight, "attitude", axis});
     position_error_.emplace_back(realism.autopilot.position_noise_m, kPositionErrorTime_s,
-                                 Random{seed, "position", axis});
+                                 Random{seeds.flight, "position", axis});
     velocity_error_.emplace_back(realism.autopilot.velocity_noise_m_s, kVelocityErrorTime_s,
-                                 Random{seed, "velocity", axis});
+                                 Random{seeds.flight, "velocity", axis});
   }
   const Multirotor& vehicle = dynamics_.vehicle();
   const double hover_rad_s = dynamics_.hover_speed_rad_s();
   for (std::size_t place = 0; place < vehicle.rotor_count; ++place) {
-    Random random{seed, "rotor", place};
+    Random random{seeds.vehicle, "rotor", place};
     RotorInput& rotor = inputs_.rotor[place];
     thrust_error_[place] = factor(realism.rotor.thrust_error_ratio, random);
     time_constant_s_[place] =
@@ -145,7 +145,7 @@ Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, cons
     rotor.blade_pass_ratio = realism.rotor.blade_pass_ratio;
     state_.phase_rad[place] = random.uniform(0.0, 2.0 * std::numbers::pi);
     speed_error_.emplace_back(realism.motor.speed_error_ratio, realism.motor.speed_error_time_s,
-                              Random{seed, "speed error", place});
+                              Random{seeds.flight, "speed error", place});
   }
   drive_motors(ControlOutput{});
 }

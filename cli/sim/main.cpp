@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,7 @@ struct Options {
   std::vector<std::string> overrides;
   sim::Level level = sim::Level::kHard;
   std::uint64_t seed = 1;
+  std::optional<std::uint64_t> vehicle_seed;
   double duration_s = 0.0;
   double imu_average_ms = 0.0;
   std::string log;
@@ -66,8 +68,11 @@ rt::Expected<sim_command::Flight> read_flight(const Options& options) {
   const std::size_t rotors = vehicle->multirotor->rotor_count;
   auto scenario = sim::Scenario::load(options.scenario_path, rotors, options.overrides);
   if (!scenario) return tl::unexpected<rt::Error>{scenario.error()};
-  sim_command::Flight flight{std::move(*vehicle), std::move(*scenario), sim::Realism::at(options.level),
-                             options.seed, options.duration_s};
+  sim_command::Flight flight{std::move(*vehicle),
+                             std::move(*scenario),
+                             sim::Realism::at(options.level),
+                             {options.vehicle_seed.value_or(options.seed), options.seed},
+                             options.duration_s};
   if (flight.duration_s <= 0.0) flight.duration_s = flight.scenario.duration_s();
   if (options.imu_average_ms > 0.0) {
     flight.realism.imu.averaging_window_s = options.imu_average_ms * 1e-3;
@@ -128,6 +133,9 @@ int run(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Level>{
           {"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}}));
   app.add_option("--seed", options.seed, "of all random numbers; default 1");
+  app.add_option(
+      "--vehicle-seed", options.vehicle_seed,
+      "of what makes this vehicle differ from its file, to fly the same one again; default: --seed");
   app.add_option("--duration", options.duration_s, "seconds; default: the flight plan's")
       ->check(CLI::Range(0.01, 1e6));
   app.add_option("--imu-average", options.imu_average_ms,
