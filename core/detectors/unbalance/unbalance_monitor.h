@@ -16,10 +16,11 @@ namespace airworthy {
 /// response · m·r·ω₀² / vehicle mass of it.
 struct UnbalanceParams {
   Multirotor vehicle;
-  double smallest_m_s2 = 0.4;  ///< advisory: growth over the baseline that is reported
-  double caution_m_s2 = 1.2;   ///< growth from which the vehicle should return
-  bool has_baseline = false;   ///< calibrated; otherwise every rotor is taken to have `usual_m_s2`
-  double usual_m_s2 = 0.5;     ///< of propellers nobody has measured
+  double smallest_m_s2 = 0.4;         ///< advisory: growth over the baseline that is reported
+  double caution_m_s2 = 1.2;          ///< growth from which the vehicle should return
+  bool thresholds_are_masses = true;  ///< then they change with `response`
+  bool has_baseline = false;          ///< calibrated; otherwise every rotor is taken to have `usual_m_s2`
+  double usual_m_s2 = 0.5;            ///< of propellers nobody has measured
   std::array<double, kMaxRotors> baseline_m_s2{};
   std::array<double, kMaxRotors> baseline_sigma_m_s2{};
   double response = 1.0;       ///< acceleration felt / force over mass, mean of x and y, near the rotor speed
