@@ -75,10 +75,12 @@ void RotorUnbalanceMonitor<N>::on_speeds(TimePoint time, std::span<const double>
 template <std::size_t N>
 bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2,
                                         double window_s) noexcept {
-  const bool flies = phase_ == Phase::kInFlight;
+  // A hard gust may look like a touch-down for a moment: what was learned before is not lost by that.
+  const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
   if (flies && !is_tracking_) {
     tracker_.forget();
     power_m2_s4_.fill(0.0);
+    against_power_m2_s4_.fill(0.0);
     tracking_since_ = time;
   }
   is_tracking_ = flies;
@@ -104,7 +106,7 @@ bool RotorUnbalanceMonitor<N>::speeds_carry_the_vehicle() const noexcept {
 
 template <std::size_t N>
 UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const noexcept {
-  if (!is_tracking_) return UnbalanceNotJudged::kNotFlying;
+  if (phase_ != Phase::kInFlight) return UnbalanceNotJudged::kNotFlying;
   const bool fuses = tracker_.counters().fused > fused_at_judgement_;
   if (to_seconds(now - tracking_since_) < kConverging_s) return UnbalanceNotJudged::kConverging;
   if (!fuses) return UnbalanceNotJudged::kSpeedUnknown;
@@ -147,9 +149,13 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];
     const double variance = tracker_.turning_variance_m2_s4(k);
-    const double power = tracker_.turning_m_s2(k, prior_.spin[k]).squared() - 2.0 * variance;
-    power_m2_s4_[k] += std::min(1.0, dt_s / kSmoothing_s) * (power - power_m2_s4_[k]);
-    rotor.amplitude_m_s2 = std::sqrt(std::max(0.0, power_m2_s4_[k]));
+    const auto smoothed = [&](double& power, int spin) {
+      const double seen = tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance;
+      power += std::min(1.0, dt_s / kSmoothing_s) * (seen - power);
+      return std::sqrt(std::max(0.0, power));
+    };
+    rotor.amplitude_m_s2 = smoothed(power_m2_s4_[k], prior_.spin[k]);
+    rotor.against_m_s2 = smoothed(against_power_m2_s4_[k], -prior_.spin[k]);
     rotor.sigma_m_s2 = std::sqrt(variance);
     rotor.growth_m_s2 = rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[k] : 0.0);
     rotor.growth_sigma_m_s2 = params_.has_baseline

@@ -49,7 +49,8 @@ enum class UnbalanceNotJudged : std::uint8_t {
 struct RotorUnbalance {
   double amplitude_m_s2 = 0.0;
   double sigma_m_s2 = 0.0;
-  double growth_m_s2 = 0.0;  ///< over the baseline
+  double against_m_s2 = 0.0;  ///< amplitude of the part that turns against the rotor
+  double growth_m_s2 = 0.0;   ///< over the baseline
   double growth_sigma_m_s2 = 0.0;
   double log_odds = 0.0;              ///< that this rotor is out of balance, against everything else
   double test_ratio = 0.0;            ///< alarm at 1
