@@ -43,6 +43,10 @@ struct SignalPowerParams {
 ///   Noise       R = 4σ⁴ + ΣᵢΣ_{j≠i} wᵢwⱼ + 4σ²·Σ wᵢ + r₀                                                   (5)
 ///   Update      P ← P + Q·Δt;  S = H·P·Hᵀ + R;  x ← x + P·Hᵀ·S⁻¹·(z − h);  P ← P − P·Hᵀ·H·P/S              (6)
 ///   Information J ← J·e^{−Δt/T} + g·gᵀ/R, of the powers sᵢ = (Uᵢ/U₀)² and (σ/σ₀)²;  g = ∂h/∂s = Hᵢ/(2sᵢ)   (7)
+///   Culprit     the same weighted least squares with one rotor apart:  z ≈ Σⱼ sⱼᵇ·gⱼ + c·Σⱼ gⱼ + pᵢ·gᵢ + n·g_{N+1},
+///               baseline sᵇ known; common change c, noise n and growth pᵢ ≥ 0 free. Evidence: half of what pᵢ takes
+///               off the sum of squares, over the mean square left without it: a log likelihood ratio. Linear in
+///               c, n, pᵢ: it needs neither prior nor convergence                                           (8)
 ///   Source      B. Ghalamchi, Z. Jia, M. W. Mueller, Real-Time Vibration-Based Propeller Fault Diagnosis for
 ///               Multicopters; entry in docs/equations/references.md, derivation in docs/equations/unbalance_power.md
 ///   Symbols     Uᵢ → unbalance_kg_m(), mass times radius;  fᵢ = κωᵢ², Δᵢ = Uᵢ/(κm) [m/s² per N],
@@ -96,6 +100,12 @@ class SignalPowerEkf {
     Rotors information{};  ///< 1/(J⁻¹)ᵢᵢ: about sᵢ = (Uᵢ/U₀)², all other rotors and the noise unknown
     Rotors alone{};  ///< Jᵢᵢ: the same if all others were known. information/alone → 0: confounded
     std::array<Rotors, N> correlation{};  ///< of the errors of sᵢ, sⱼ; near −1: one can stand for the other
+  };
+
+  /// (8): what speaks for each rotor as the only one that differs from the others, or from the baseline.
+  struct Culprits {
+    Rotors evidence{};        ///< log likelihood ratio; 0 where the rotor would have to shake less
+    Rotors unbalance_kg_m{};  ///< of this rotor if it is the one: baseline, common change and growth
   };
 
   explicit SignalPowerEkf(const SignalPowerParams& params) noexcept
@@ -170,6 +180,12 @@ class SignalPowerEkf {
   [[nodiscard]] Scalar unbalance_sigma_kg_m(Scalar information, Scalar unbalance_kg_m) const noexcept {
     return reference_kg_m_ * reference_kg_m_ / (Scalar{2} * unbalance_kg_m * std::sqrt(information));
   }
+  /// (8). `baseline`: powers() of a healthy flight; zero where there is none. Cost: N + 1 solutions of order 2; for the
+  /// rate of a report.
+  [[nodiscard]] Culprits culprits(const Rotors& baseline) const noexcept;
+  /// sⱼ = (Uⱼ/U₀)² by the least squares of (7), all rotors at once, each within about 1 of their mean (a priori): what
+  /// the flight cannot tell apart stays alike. Negative values are noise. Cost as isolation().
+  [[nodiscard]] Rotors powers() const noexcept;
   /// J of (7), by rotor and last the noise.
   [[nodiscard]] const Matrix& information() const noexcept { return information_; }
 
@@ -245,7 +261,7 @@ class SignalPowerEkf {
     if (!(s > Scalar{0}) || !std::isfinite(innovation.nis)) return refuse(UpdateStatus::kNotFinite);
     take(sample, passed);
     correct(ph, s, limited(innovation.innovation_m2_s4, s), dt_s);
-    inform(predicted, dt_s);
+    inform(predicted, z, dt_s);
     ++fused_;
     return UpdateStatus::kFused;
   }
@@ -287,15 +303,19 @@ class SignalPowerEkf {
     }
   }
 
-  void inform(const Prediction& predicted, Scalar dt_s) noexcept {   // (7)
-    const Scalar keep = Scalar{1} / (Scalar{1} + dt_s / memory_s_);  // e^{−Δt/T} to (Δt/T)²/2
+  void inform(const Prediction& predicted, Scalar z, Scalar dt_s) noexcept {  // (7)
+    const Scalar keep = Scalar{1} / (Scalar{1} + dt_s / memory_s_);           // e^{−Δt/T} to (Δt/T)²/2
     const Scalar weight = Scalar{1} / predicted.variance_m4_s8;
+    count_ = count_ * keep + Scalar{1};
+    squares_ = squares_ * keep + z * z * weight;
     Vector g{};
     for (std::size_t i = 0; i < kStates; ++i)
       g[i] = predicted.jacobian[i] / (Scalar{2} * predicted.square[i]);
     for (std::size_t i = 0; i < kStates; ++i) {
+      const Scalar weighted = g[i] * weight;
+      explained_[i] = explained_[i] * keep + weighted * z;
       for (std::size_t j = 0; j < kStates; ++j)
-        information_[i][j] = information_[i][j] * keep + g[i] * g[j] * weight;
+        information_[i][j] = information_[i][j] * keep + weighted * g[j];
     }
   }
 
@@ -319,6 +339,10 @@ class SignalPowerEkf {
   Vector x_{};
   Matrix p_{};
   Matrix information_{};
+  // Forgotten as J: Σ g·z/R, Σ z²/R, Σ 1.
+  Vector explained_{};
+  Scalar squares_ = 0;
+  Scalar count_ = 0;
   Limits limits_;
   std::int64_t fused_ = 0;
   std::int64_t refused_ = 0;
@@ -374,6 +398,75 @@ typename SignalPowerEkf<Scalar, N>::Isolation SignalPowerEkf<Scalar, N>::isolati
       const auto b = static_cast<Eigen::Index>(k);
       result.correlation[i][k] = inverse(a, b) / std::sqrt(inverse(a, a) * inverse(b, b));
     }
+  }
+  return result;
+}
+
+template <class Scalar, std::size_t N>
+typename SignalPowerEkf<Scalar, N>::Rotors SignalPowerEkf<Scalar, N>::powers() const noexcept {
+  using Square = BoundedMatrix<Scalar, static_cast<int>(kStates)>;
+  Square a(kStates, kStates);
+  Square inverse;
+  for (std::size_t i = 0; i < kStates; ++i) {
+    for (std::size_t j = 0; j < kStates; ++j) {
+      // The prior is on the deviations from the mean: I − 1·1ᵀ/N for the rotors, nothing for the noise.
+      Scalar prior{0};
+      if (i < N && j < N) prior = (i == j ? Scalar{1} : Scalar{0}) - Scalar{1} / static_cast<Scalar>(N);
+      a(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = information_[i][j] + prior;
+    }
+  }
+  Rotors result{};
+  if (!invert_positive_definite<Scalar, static_cast<int>(kStates)>(a, inverse)) return result;
+  for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t j = 0; j < kStates; ++j) {
+      result[i] += inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * explained_[j];
+    }
+  }
+  return result;
+}
+
+template <class Scalar, std::size_t N>
+typename SignalPowerEkf<Scalar, N>::Culprits SignalPowerEkf<Scalar, N>::culprits(
+    const Rotors& baseline) const noexcept {
+  // What the baseline leaves to explain, r, and the normal equations of [common, noise].
+  Vector r = explained_;
+  Rotors with_common{};
+  Scalar common{0};
+  Scalar common_noise{0};
+  Scalar common_r{0};
+  Scalar squares = squares_;
+  for (std::size_t j = 0; j < N; ++j) {
+    for (std::size_t i = 0; i < kStates; ++i) r[i] -= information_[i][j] * baseline[j];
+  }
+  for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t j = 0; j < N; ++j) with_common[i] += information_[i][j];
+    common += with_common[i];
+    common_noise += information_[i][N];
+    common_r += r[i];
+    squares -= baseline[i] * (explained_[i] + r[i]);
+  }
+  Culprits result;
+  const Scalar noise = information_[N][N];
+  const Scalar determinant = common * noise - common_noise * common_noise;
+  if (!(determinant > Scalar{0})) return result;
+  const auto solve = [&](Scalar a, Scalar b) {
+    return std::array{(noise * a - common_noise * b) / determinant,
+                      (common * b - common_noise * a) / determinant};
+  };
+  const auto without = solve(common_r, r[N]);
+  const Scalar mean_square = (squares - without[0] * common_r - without[1] * r[N]) / count_;
+  if (!(mean_square > Scalar{0})) return result;
+  constexpr Scalar kRounding = Scalar{64} * std::numeric_limits<Scalar>::epsilon();
+  for (std::size_t i = 0; i < N; ++i) {
+    // Rotor i projected off [common, noise]: what is left of its regressor and of r.
+    const auto share = solve(with_common[i], information_[i][N]);
+    const Scalar left = information_[i][i] - with_common[i] * share[0] - information_[i][N] * share[1];
+    const Scalar told = r[i] - with_common[i] * without[0] - information_[i][N] * without[1];
+    if (!(left > kRounding * information_[i][i]) || !(told > Scalar{0})) continue;
+    const Scalar growth = told / left;
+    result.evidence[i] = static_cast<Scalar>(0.5) * told * growth / mean_square;
+    const Scalar power = baseline[i] + without[0] + growth * (Scalar{1} - share[0]);
+    result.unbalance_kg_m[i] = reference_kg_m_ * std::sqrt(std::max(power, Scalar{0}));
   }
   return result;
 }

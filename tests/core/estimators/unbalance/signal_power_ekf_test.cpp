@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "tests/support/allocation_guard.h"
 #include "tests/support/reference/dense_signal_power_ekf.h"
@@ -462,6 +463,110 @@ TEST(SignalPowerEkf, InformationIsThatOfWeightedLeastSquares) {
     EXPECT_NEAR(isolation.information[rotor], 1.0 / covariance(i, i), 1e-6 / covariance(i, i));
     EXPECT_NEAR(isolation.alone[rotor], normal(i, i), 1e-9 * normal(i, i));
   }
+}
+
+/// The rows of the least squares of (7) and (8): √(1/R)·[g₁ … g_N, 2 | z].
+struct Rows {
+  Eigen::MatrixXd g{0, 5};
+  Eigen::VectorXd z{0};
+};
+
+Rows rows_of(SignalPowerEkf<double, 4>& ekf, ModelFlight<4>& flight, double duration_s) {
+  std::vector<double> values;
+  SignalPowerEkf<double, 4>::Innovation innovation;
+  while (flight.time_s < duration_s) {
+    flight.step();
+    if (ekf.update(sample_of<double>(flight), innovation) != UpdateStatus::kFused) continue;
+    const double weight = 1.0 / std::sqrt(innovation.measurement_variance_m4_s8);
+    for (const double speed : flight.speed_rad_s) {
+      values.push_back(weight * std::pow(20e-6 * kMedium.radius_m * speed * speed / kMedium.mass_kg, 2));
+    }
+    values.push_back(weight * 2.0);
+    values.push_back(weight * innovation.power_m2_s4);
+  }
+  const auto count = static_cast<Eigen::Index>(values.size() / 6);
+  const Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>> all{values.data(), count, 6};
+  return {all.leftCols<5>(), all.col(5)};
+}
+
+double sum_of_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  return (b - a * a.householderQr().solve(b)).squaredNorm();
+}
+
+TEST(SignalPowerEkf, CulpritsAreLikelihoodRatiosOfLeastSquaresFits) {
+  SignalPowerParams params = params_of(kMedium);
+  params.information_memory_s = 1e12;
+  SignalPowerEkf<double, 4> ekf{params};
+  ModelFlight<4> flight{kMedium, {10.0, 5.0, 40.0, 5.0}, 104};
+  const Rows rows = rows_of(ekf, flight, 20.0);
+  for (const std::array<double, 4>& baseline :
+       {std::array{0.0, 0.0, 0.0, 0.0}, std::array{0.5, 0.3, 0.1, -0.1}, std::array{0.0, 0.0, 4.0, 0.0}}) {
+    const Eigen::VectorXd left =
+        rows.z - rows.g.leftCols<4>() * Eigen::Map<const Eigen::Vector4d>(baseline.data());
+    Eigen::MatrixXd alike(rows.g.rows(), 2);
+    alike << rows.g.leftCols<4>().rowwise().sum(), rows.g.col(4);
+    const double without = sum_of_squares(alike, left);
+    const auto culprits = ekf.culprits(baseline);
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      Eigen::MatrixXd apart(rows.g.rows(), 3);
+      apart << alike, rows.g.col(i);
+      const Eigen::VectorXd fit = apart.householderQr().solve(left);
+      const double ratio =
+          0.5 * (without - (left - apart * fit).squaredNorm()) / without * static_cast<double>(rows.g.rows());
+      const auto rotor = static_cast<std::size_t>(i);
+      EXPECT_NEAR(culprits.evidence[rotor], fit(2) > 0.0 ? ratio : 0.0, 1e-6 * (1.0 + ratio));
+      if (fit(2) <= 0.0) continue;
+      const double power = std::max(0.0, baseline[rotor] + fit(0) + fit(2));
+      EXPECT_NEAR(culprits.unbalance_kg_m[rotor], 2e-6 * std::sqrt(power), 1e-12);
+    }
+  }
+}
+
+TEST(SignalPowerEkf, PowersAreRidgeRegressionTowardsTheirMean) {
+  SignalPowerParams params = params_of(kMedium);
+  params.information_memory_s = 1e12;
+  SignalPowerEkf<double, 4> ekf{params};
+  ModelFlight<4> flight{kMedium, {10.0, 5.0, 40.0, 5.0}, 105};
+  const Rows rows = rows_of(ekf, flight, 10.0);
+  // The prior as rows: the deviation of each rotor from the mean of all is 0 with variance 1.
+  Eigen::MatrixXd a(rows.g.rows() + 4, 5);
+  a.topRows(rows.g.rows()) = rows.g;
+  a.bottomRows<4>().setZero();
+  a.bottomLeftCorner<4, 4>() = Eigen::Matrix4d::Identity() - Eigen::Matrix4d::Constant(0.25);
+  Eigen::VectorXd b(a.rows());
+  b << rows.z, Eigen::Vector4d::Zero();
+  const Eigen::VectorXd expected = a.householderQr().solve(b);
+  const auto powers = ekf.powers();
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(powers[i], expected(static_cast<Eigen::Index>(i)), 1e-8);
+  }
+}
+
+// What the prior of the filter takes 100 s to give up, the least squares never had.
+TEST(SignalPowerEkf, TheCulpritIsKnownLongBeforeTheFilterConverges) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SignalPowerEkf<double, 4> ekf{params_of(kMedium)};
+    SignalPowerEkf<float, 4> single{params_of(kMedium)};
+    ModelFlight<4> flight{kMedium, {5.0, 40.0, 5.0, 5.0}, seed};
+    ModelFlight<4> same{kMedium, {5.0, 40.0, 5.0, 5.0}, seed};
+    fly(ekf, flight, 10.0);
+    fly(single, same, 10.0);
+    const auto culprits = ekf.culprits({});
+    const auto in_float = single.culprits({});
+    EXPECT_NEAR(1e6 * culprits.unbalance_kg_m[1] / kMedium.radius_m, 40.0, 6.0) << "seed " << seed;
+    for (const std::size_t other : {0U, 2U, 3U}) {
+      EXPECT_GT(culprits.evidence[1], culprits.evidence[other] + 25.0) << "seed " << seed;
+    }
+    EXPECT_NEAR(in_float.evidence[1], culprits.evidence[1], 0.02 * culprits.evidence[1]);
+    EXPECT_NEAR(in_float.unbalance_kg_m[1], culprits.unbalance_kg_m[1], 1e-3 * culprits.unbalance_kg_m[1]);
+  }
+}
+
+TEST(SignalPowerEkf, NobodyIsTheCulpritInUnison) {
+  SignalPowerEkf<double, 4> ekf{params_of(kMedium)};
+  ModelFlight<4> flight{kMedium, {5.0, 40.0, 5.0, 5.0}, 106, {.is_in_unison = true}};
+  fly(ekf, flight, 30.0);
+  for (const double evidence : ekf.culprits({}).evidence) EXPECT_EQ(evidence, 0.0);
 }
 
 // Erratum: the correction as printed, with S where S⁻¹ belongs, is no estimator.
