@@ -37,6 +37,7 @@ struct FlightRecord {
   std::string vehicle;
   std::vector<RotorRecord> rotors;
   std::vector<std::vector<double>> speed_rpm;  ///< reports of each rotor, in flight
+  std::array<double, kMaxRotors> powers{};     ///< of the signal-power filter at the end
   std::int64_t judgements = 0;
   UnbalanceNotJudged last_reason = UnbalanceNotJudged::kNotFlying;
 
@@ -51,6 +52,7 @@ struct FlightRecord {
 
 struct Judgement {
   TimePoint time;
+  std::array<double, kMaxRotors> powers;
   std::vector<RotorUnbalance> rotors;
 };
 
@@ -80,7 +82,8 @@ rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceCo
     auto service = std::make_shared<unbalance::UnbalanceService>(node, config);
     service->observe([&](const UnbalanceMonitor& monitor) {
       if (monitor.state() != DetectorState::kMonitoring) return;
-      judgements.push_back({monitor.judged_at(), {monitor.rotors().begin(), monitor.rotors().end()}});
+      judgements.push_back(
+          {monitor.judged_at(), monitor.powers(), {monitor.rotors().begin(), monitor.rotors().end()}});
     });
     return service;
   });
@@ -92,7 +95,9 @@ rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceCo
   FlightRecord record{log, flight->vehicle, std::vector<RotorRecord>(rotors),
                       std::vector<std::vector<double>>(rotors)};
   for (const Judgement& judgement : judgements) {
-    if (judgement.time < until) keep(judgement, record);
+    if (judgement.time >= until) continue;
+    keep(judgement, record);
+    record.powers = judgement.powers;
   }
   for (const auto& [time, speeds] : reports) {
     const bool in_flight = !judgements.empty() && time >= judgements.front().time &&
@@ -308,7 +313,11 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
     for (const double a : all.amplitude_m_s2) {
       variance += (a - baseline) * (a - baseline) / static_cast<double>(all.amplitude_m_s2.size());
     }
-    calibration.rotors.push_back({baseline, std::sqrt(variance)});
+    double filter_power = 0.0;
+    for (const FlightRecord& flight : *flights) {
+      filter_power += flight.powers[i] / static_cast<double>(flights->size());
+    }
+    calibration.rotors.push_back({baseline, std::sqrt(variance), filter_power});
     learned.smallest_growth_m_s2.push_back(config.monitor.smallest_m_s2 +
                                            kSigmas * std::hypot(median(all.sigma_m_s2), std::sqrt(variance)));
     for (const double a : all.amplitude_m_s2) power += a * a;

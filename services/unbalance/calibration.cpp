@@ -31,7 +31,8 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
   calibration.against_ratio = root.required<double>("against_ratio", Range{0.0, 1.0});
   for (ConfigTable rotor : root.tables("rotor", {.count = Count{3, kMaxRotors}})) {
     calibration.rotors.push_back({rotor.required<double>("baseline_m_s2", kAmplitude),
-                                  rotor.required<double>("baseline_sigma_m_s2", kAmplitude)});
+                                  rotor.required<double>("baseline_sigma_m_s2", kAmplitude),
+                                  rotor.optional<double>("power", 0.0, Range{-1e6, 1e6})});
   }
   calibration.hash = file.hash();
   return file.finish(std::move(calibration));
@@ -62,6 +63,7 @@ rt::Expected<UnbalanceParams> with_calibration(UnbalanceParams params, const Cal
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
     params.baseline_m_s2[i] = calibration.rotors[i].baseline_m_s2;
     params.baseline_sigma_m_s2[i] = calibration.rotors[i].baseline_sigma_m_s2;
+    params.baseline_power[i] = calibration.rotors[i].power / (ratio * ratio);
   }
   return params;
 }
@@ -85,8 +87,10 @@ std::string to_toml(const Calibration& calibration) {
       calibration.speed_latency_s, calibration.speed_noise_ratio, calibration.response,
       calibration.has_trial_mass, calibration.against_ratio);
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
-    text += fmt::format("\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\n", i + 1,
-                        calibration.rotors[i].baseline_m_s2, calibration.rotors[i].baseline_sigma_m_s2);
+    text += fmt::format(
+        "\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\npower = {:.6g}\n", i + 1,
+        calibration.rotors[i].baseline_m_s2, calibration.rotors[i].baseline_sigma_m_s2,
+        calibration.rotors[i].power);
   }
   return text;
 }

@@ -14,6 +14,7 @@ struct Calibration {
   struct Rotor {
     double baseline_m_s2 = 0.0;        ///< amplitude at hover speed, mean over the flights
     double baseline_sigma_m_s2 = 0.0;  ///< of a single judgement around it, between flights included
+    double power = 0.0;                ///< of the signal-power filter, (U/U₀)²; 0 = not learned
   };
 
   std::string vehicle;

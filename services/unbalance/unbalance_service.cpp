@@ -54,6 +54,9 @@ UnbalanceService::UnbalanceService(rt::Node& node, const UnbalanceConfig& config
       reporter_{node, "unbalance", [this] { return report(); }} {
   node_.subscribe<esc_status_t>(channel::kEscStatus,
                                 [this](const esc_status_t& message) { on_esc_status(message); });
+  node_.subscribe<rotor_command_t>(channel::kRotorCommand, [this](const rotor_command_t& message) {
+    monitor_->on_commands(from_us(message.header.time_us), message.command_ratio);
+  });
   // After the phase's own subscription: what it must know of this sample has been queued.
   node_.subscribe<imu_t>(channel::kImu, [this](const imu_t& message) { on_imu(message); });
 }
@@ -90,6 +93,7 @@ std::vector<evidence_t> UnbalanceService::evidence_of(const RotorUnbalance& roto
           evidence("tip_mass_growth", mg_per_g_mm_ * g_mm_per_m_s2_ * rotor.growth_m_s2, "mg"),
           evidence("amplitude", rotor.amplitude_m_s2, "m/s^2"),
           evidence("information", sigma > 0.0 ? 1.0 / (sigma * sigma) : 0.0, "s^4/m^2"),
+          evidence("by_signal_power", rotor.by_power ? 1.0 : 0.0, "1"),
           evidence("log_odds", rotor.log_odds, "1"),
           evidence("test_ratio", rotor.test_ratio, "1"),
           evidence("nis_mean", innovation.nis, "1"),

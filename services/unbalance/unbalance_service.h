@@ -5,6 +5,7 @@
 
 #include "airworthy/esc_status_t.hpp"
 #include "airworthy/imu_t.hpp"
+#include "airworthy/rotor_command_t.hpp"
 #include "core/detectors/unbalance/unbalance_monitor.h"
 #include "runtime/detector/fault_reporter.h"
 #include "runtime/phase/flight_phase_input.h"

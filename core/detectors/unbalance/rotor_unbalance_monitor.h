@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/detectors/unbalance/power_fallback.h"
 #include "core/detectors/unbalance/rotor_hypotheses.h"
 #include "core/detectors/unbalance/unbalance_monitor.h"
 #include "core/estimators/unbalance/order_tracker.h"
@@ -14,6 +15,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
 
   void on_phase(Phase phase) noexcept override;
   void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept override;
+  void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept override;
   bool on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2, double window_s) noexcept override;
 
   [[nodiscard]] DetectorState state() const noexcept override { return state_; }
@@ -23,6 +25,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   [[nodiscard]] std::uint32_t candidates() const noexcept override { return candidates_; }
   [[nodiscard]] TimePoint ambiguous_since() const noexcept override { return ambiguous_since_; }
   [[nodiscard]] UnbalanceInnovation innovation() const noexcept override;
+  [[nodiscard]] std::array<double, kMaxRotors> powers() const noexcept override;
 
  private:
   using Tracker = OrderTracker<double, N>;
@@ -44,6 +47,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   void estimate(double dt_s) noexcept;
   void test_rotors(TimePoint now) noexcept;
   void test_ambiguity(TimePoint now, double log_odds_faulty) noexcept;
+  void judge_by_power(TimePoint now, double dt_s) noexcept;
   void mute(UnbalanceNotJudged reason, TimePoint now) noexcept;
   [[nodiscard]] UnbalanceNotJudged reason_for_all(TimePoint now) const noexcept;
   [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor) const noexcept;
@@ -51,6 +55,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
 
   UnbalanceParams params_;
   Tracker tracker_;
+  PowerFallback<N> fallback_;
   UnbalancePrior<double, N> prior_;
   std::array<RotorUnbalance, N> rotor_{};
   std::array<double, N> power_m2_s4_{};  ///< smoothed |A₊|² less its variance
