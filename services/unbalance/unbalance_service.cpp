@@ -57,6 +57,9 @@ UnbalanceService::UnbalanceService(rt::Node& node, const UnbalanceConfig& config
   node_.subscribe<rotor_command_t>(channel::kRotorCommand, [this](const rotor_command_t& message) {
     monitor_->on_commands(from_us(message.header.time_us), message.command_ratio);
   });
+  node_.subscribe<tick_t>(channel::kTick, [this](const tick_t& message) {
+    if (monitor_->on_clock(from_us(message.header.time_us))) report_all();
+  });
   // After the phase's own subscription: what it must know of this sample has been queued.
   node_.subscribe<imu_t>(channel::kImu, [this](const imu_t& message) { on_imu(message); });
 }
@@ -76,6 +79,10 @@ void UnbalanceService::on_imu(const imu_t& message) {
   if (!monitor_->on_accel(time, message.accel_m_s2[0], message.accel_m_s2[1], message.averaging_window_s)) {
     return;
   }
+  report_all();
+}
+
+void UnbalanceService::report_all() {
   if (observer_) observer_(*monitor_);
   const auto rotors = monitor_->rotors();
   for (std::size_t i = 0; i < rotors.size(); ++i) report_rotor(i, rotors[i]);
@@ -138,6 +145,8 @@ std::string UnbalanceService::reason_of(const RotorUnbalance& rotor) const {
       break;
     case UnbalanceNotJudged::kNotFlying:
       return fmt::format("not in flight: {}", name_of(phase_.phase().phase()));
+    case UnbalanceNotJudged::kInertialStale:
+      return "inertial data stale";
     case UnbalanceNotJudged::kConverging:
       return "converging";
     case UnbalanceNotJudged::kSpeedUnknown:

@@ -31,6 +31,7 @@ class UnbalanceService {
  private:
   void on_imu(const imu_t& message);
   void on_esc_status(const esc_status_t& message);
+  void report_all();
   void report_rotor(std::size_t index, const RotorUnbalance& rotor);
   void report_ambiguity();
   [[nodiscard]] rt::DetectorReport report() const;

@@ -15,6 +15,7 @@ constexpr double kConverging_s = 1.0;
 constexpr double kSmoothing_s = 0.5;
 constexpr double kSigmas = 2.0;
 constexpr double kFrozen_s = 1.0;
+constexpr double kInertialStale_s = 1.0;
 constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
 constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
@@ -99,6 +100,8 @@ void RotorUnbalanceMonitor<N>::on_commands(TimePoint time, std::span<const doubl
 template <std::size_t N>
 bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2,
                                         double window_s) noexcept {
+  accel_at_ = time;
+  has_accel_ = true;
   // A hard gust may look like a touch-down for a moment: what was learned before is not lost by that.
   const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
   if (flies && !is_tracking_) {
@@ -122,6 +125,15 @@ bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double 
 }
 
 template <std::size_t N>
+bool RotorUnbalanceMonitor<N>::on_clock(TimePoint now) noexcept {
+  if (!has_accel_ || to_seconds(now - accel_at_) <= kInertialStale_s || now - judged_at_ < kPeriod)
+    return false;
+  is_tracking_ = false;
+  judge(now);
+  return true;
+}
+
+template <std::size_t N>
 bool RotorUnbalanceMonitor<N>::speeds_carry_the_vehicle() const noexcept {
   double sum = 0.0;
   for (const double speed : tracker_.speed_rad_s()) sum += speed * speed;
@@ -132,6 +144,7 @@ bool RotorUnbalanceMonitor<N>::speeds_carry_the_vehicle() const noexcept {
 
 template <std::size_t N>
 UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const noexcept {
+  if (to_seconds(now - accel_at_) > kInertialStale_s) return UnbalanceNotJudged::kInertialStale;
   if (phase_ != Phase::kInFlight) return UnbalanceNotJudged::kNotFlying;
   const bool fuses = tracker_.counters().fused > fused_at_judgement_;
   if (to_seconds(now - tracking_since_) < kConverging_s) return UnbalanceNotJudged::kConverging;

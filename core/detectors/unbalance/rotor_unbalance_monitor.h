@@ -17,6 +17,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept override;
   void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept override;
   bool on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2, double window_s) noexcept override;
+  bool on_clock(TimePoint now) noexcept override;
 
   [[nodiscard]] DetectorState state() const noexcept override { return state_; }
   [[nodiscard]] TimePoint judged_at() const noexcept override { return judged_at_; }
@@ -72,6 +73,8 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   DetectorState state_ = DetectorState::kInitialising;
   Phase phase_ = Phase::kUnknown;
   TimePoint judged_at_{};
+  TimePoint accel_at_{};
+  bool has_accel_ = false;
   TimePoint tracking_since_{};
   bool is_tracking_ = false;
   bool has_judged_ = false;

@@ -39,6 +39,7 @@ struct UnbalanceParams {
 enum class UnbalanceNotJudged : std::uint8_t {
   kJudged,
   kNotFlying,          ///< by the flight phase
+  kInertialStale,      ///< no inertial data for a second
   kConverging,         ///< less than a second of data
   kSpeedUnknown,       ///< rotor speeds missing, stale or too seldom
   kSpeedImplausible,   ///< rotor speeds that do not carry the vehicle, or frozen
@@ -92,6 +93,9 @@ class UnbalanceMonitor {
   virtual void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept = 0;
   /// Horizontal specific force in the body frame. True when the vehicle was judged anew.
   virtual bool on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2, double window_s) noexcept = 0;
+
+  /// The clock, for the time when no inertial data come. True when the vehicle was judged anew.
+  virtual bool on_clock(TimePoint now) noexcept = 0;
 
   [[nodiscard]] virtual DetectorState state() const noexcept = 0;
   [[nodiscard]] virtual TimePoint judged_at() const noexcept = 0;
