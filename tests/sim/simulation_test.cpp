@@ -310,7 +310,8 @@ double line_m_s2(const Recorder& recorder, std::size_t rotor, double from_s, dou
   const double speed_rad_s = mean_speed_rpm(recorder, rotor, from_s, until_s) * std::numbers::pi / 30.0;
   double most = 0.0;
   // The mean speed is not exact, and the line wanders: the strongest of its neighbourhood.
-  for (double detune = -0.03; detune <= 0.03; detune += 0.0005) {
+  for (int step = -60; step <= 60; ++step) {
+    const double detune = 0.0005 * step;
     Eigen::Vector2cd sum = Eigen::Vector2cd::Zero();
     int count = 0;
     for (const ImuSample& sample : recorder.imu) {
