@@ -11,7 +11,7 @@ namespace {
 using Transition = FaultLifeCycle::Transition;
 
 constexpr double kGravity_m_s2 = 9.81;
-constexpr double kConverging_s = 1.0;
+constexpr double kConverging_s = 0.5;
 constexpr double kSmoothing_s = 0.5;
 constexpr double kSigmas = 2.0;
 constexpr double kFrozen_s = 1.0;
@@ -106,6 +106,7 @@ bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double 
   const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
   if (flies && !is_tracking_) {
     tracker_.forget();
+    estimated_s_ = 0.0;
     power_m2_s4_.fill(0.0);
     against_power_m2_s4_.fill(0.0);
     fallback_.restart();
@@ -185,13 +186,16 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     for (const double one : tracker_.speed_rad_s()) speed += one / static_cast<double>(N);
     return SensorResponse<double>{0.0, params_.low_pass_Hz}.at(speed, 0.0, window_s_).magnitude();
   }();
+  // A running mean at first, so that the start at zero leaves no trace.
+  estimated_s_ += dt_s;
+  const double share = std::min(1.0, dt_s / std::min(estimated_s_, kSmoothing_s));
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];
     rotor.by_power = false;
     const double variance = tracker_.turning_variance_m2_s4(k);
     const auto smoothed = [&](double& power, int spin) {
       const double seen = tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance;
-      power += std::min(1.0, dt_s / kSmoothing_s) * (seen - power);
+      power += share * (seen - power);
       return std::sqrt(std::max(0.0, power));
     };
     rotor.amplitude_m_s2 = smoothed(power_m2_s4_[k], prior_.spin[k]);

@@ -61,6 +61,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   std::array<RotorUnbalance, N> rotor_{};
   std::array<double, N> power_m2_s4_{};  ///< smoothed |A₊|² less its variance
   std::array<double, N> against_power_m2_s4_{};
+  double estimated_s_ = 0.0;
   std::array<FaultLifeCycle, N> life_;
   std::array<Held, N> grown_{};
   std::array<bool, N> is_known_{};
