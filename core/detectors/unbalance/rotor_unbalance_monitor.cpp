@@ -39,6 +39,12 @@ std::array<double, N> first(const std::array<double, kMaxRotors>& all) {
   return result;
 }
 
+template <std::size_t... kIndex>
+std::array<FaultLifeCycle, sizeof...(kIndex)> life_cycles(const FaultLifeCycleParams& params,
+                                                          std::index_sequence<kIndex...>) {
+  return {(static_cast<void>(kIndex), FaultLifeCycle{params})...};
+}
+
 }  // namespace
 
 double UnbalanceMonitor::hover_speed_rad_s(const Multirotor& vehicle) noexcept {
@@ -60,12 +66,8 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
                 .speed_noise_ratio = params.speed_noise_ratio,
                 .low_pass_Hz = params.low_pass_Hz}},
       fallback_{params.vehicle, power_params(params), first<N>(params.baseline_power)},
-      life_{[&]<std::size_t... kIndex>(std::index_sequence<kIndex...>){return std::array<FaultLifeCycle, N>{
-          (static_cast<void>(kIndex), FaultLifeCycle{params.life_cycle})...};
-}  // namespace airworthy
-(std::make_index_sequence<N>{})
-}
-, ambiguity_life_{params.life_cycle} {
+      life_{life_cycles(params.life_cycle, std::make_index_sequence<N>{})},
+      ambiguity_life_{params.life_cycle} {
   for (std::size_t i = 0; i < N; ++i) {
     prior_.spin[i] = params.vehicle.rotor[i].spin;
     prior_.amplitude_m_s2[i] =
@@ -157,7 +159,7 @@ UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const
 }
 
 template <std::size_t N>
-std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor) const noexcept {
+std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor, bool is_informed) const noexcept {
   const auto power = [this](std::size_t i, std::size_t j) {
     double sum = 0.0;
     for (std::size_t a = 0; a < 2; ++a) {
@@ -170,8 +172,10 @@ std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor) const
   };
   std::uint32_t mask = 0;
   for (std::size_t j = 0; j < N; ++j) {
-    if (j != rotor &&
-        power(rotor, j) > kConfounded * kConfounded * std::sqrt(power(rotor, rotor) * power(j, j))) {
+    if (j == rotor) continue;
+    const bool correlates =
+        power(rotor, j) > kConfounded * kConfounded * std::sqrt(power(rotor, rotor) * power(j, j));
+    if (!tracker_.are_apart(rotor, j) || (!is_informed && correlates)) {
       mask |= 1U << j;
     }
   }
@@ -184,7 +188,7 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     // What the sensors leave of the vibration at the mean speed; the high-pass is not theirs.
     double speed = 0.0;
     for (const double one : tracker_.speed_rad_s()) speed += one / static_cast<double>(N);
-    return SensorResponse<double>{0.0, params_.low_pass_Hz}.at(speed, 0.0, window_s_).magnitude();
+    return SensorResponse<double>{0.0, params_.low_pass_Hz}.sensor(speed, window_s_).magnitude();
   }();
   // A running mean at first, so that the start at zero leaves no trace.
   estimated_s_ += dt_s;
@@ -194,7 +198,9 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     rotor.by_power = false;
     const double variance = tracker_.turning_variance_m2_s4(k);
     const auto smoothed = [&](double& power, int spin) {
-      const double seen = tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance;
+      // Bounded below, or one moment without any knowledge would hide what is seen after it.
+      const double seen = std::max(tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance,
+                                   -params_.smallest_m_s2 * params_.smallest_m_s2);
       power += share * (seen - power);
       return std::sqrt(std::max(0.0, power));
     };
@@ -207,11 +213,11 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
                                   : rotor.sigma_m_s2;
     const bool is_informed = rotor.sigma_m_s2 < kLeastInformation * params_.smallest_m_s2 ||
                              rotor.amplitude_m_s2 > 4.0 * rotor.sigma_m_s2;
-    rotor.confounded_with = is_informed ? 0U : confounded_with(k);
-    rotor.reason = is_informed                   ? UnbalanceNotJudged::kJudged
-                   : gain < kLeastGain           ? UnbalanceNotJudged::kUnfitInertialData
-                   : rotor.confounded_with != 0U ? UnbalanceNotJudged::kConfounded
-                                                 : UnbalanceNotJudged::kConverging;
+    rotor.confounded_with = confounded_with(k, is_informed);
+    rotor.reason = is_informed && rotor.confounded_with == 0U ? UnbalanceNotJudged::kJudged
+                   : !is_informed && gain < kLeastGain        ? UnbalanceNotJudged::kUnfitInertialData
+                   : rotor.confounded_with != 0U              ? UnbalanceNotJudged::kConfounded
+                                                              : UnbalanceNotJudged::kConverging;
   }
 }
 
@@ -223,9 +229,11 @@ void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
     // A usual unbalance that nobody has measured is no growth.
     const double least =
         params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
-    grown_[i].step(!is_known_[i] && rotor.growth_m_s2 - doubt > least, now);
+    const bool is_judged = rotor.reason == UnbalanceNotJudged::kJudged;
+    grown_[i].step(!is_known_[i] && is_judged && rotor.growth_m_s2 - doubt > least, now);
     if (is_known_[i]) {
-      rotor.test_ratio = (rotor.growth_m_s2 + doubt) / least;
+      // What was found stays found while another rotor might take its place.
+      rotor.test_ratio = is_judged ? (rotor.growth_m_s2 + doubt) / least : 1.0;
     } else {
       rotor.test_ratio = std::min((rotor.growth_m_s2 - doubt) / least,
                                   grown_[i].for_s(params_.persistence_s, now) ? 1e9 : 0.999);
@@ -237,20 +245,38 @@ void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
 }
 
 template <std::size_t N>
+double RotorUnbalanceMonitor<N>::shared_growth_m_s2(std::size_t rotor) const noexcept {
+  // The filter deals out evenly what rotors share, so that it is the sum of their parts.
+  double sum = 0.0;
+  for (std::size_t j = 0; j < N; ++j) {
+    const bool shares = j == rotor || (rotor_[rotor].confounded_with >> j & 1U) != 0U;
+    if (!shares) continue;
+    if (is_known_[j]) return 0.0;  // it may all be of the one that is known
+    sum += tracker_.turning_m_s2(j, prior_.spin[j]).magnitude();
+    if (params_.has_baseline) sum -= params_.baseline_m_s2[j];
+  }
+  return sum;
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_faulty) noexcept {
-  double most = 0.0;
+  bool is_pinned = false;
   double most_growth = 0.0;
-  for (const RotorUnbalance& rotor : rotor_) {
-    most = std::max(most, rotor.log_odds);
-    most_growth = std::max(most_growth, rotor.growth_m_s2);
+  std::uint32_t suspects = 0;
+  for (std::size_t i = 0; i < N; ++i) {
+    if (is_known_[i]) continue;
+    const RotorUnbalance& rotor = rotor_[i];
+    is_pinned = is_pinned || (rotor.log_odds >= params_.log_odds && rotor.confounded_with == 0U);
+    most_growth = std::max(most_growth, shared_growth_m_s2(i));
+    if (rotor.log_odds > -params_.log_odds) suspects |= 1U << i;
   }
   const bool is_nobodys =
-      log_odds_faulty > params_.log_odds && most < params_.log_odds && most_growth > params_.smallest_m_s2;
+      log_odds_faulty > params_.log_odds && !is_pinned && most_growth > params_.smallest_m_s2;
   ambiguous_.step(is_nobodys, now);
   if (is_nobodys && !ambiguity_life_.active()) {
-    candidates_ = 0;
+    candidates_ = suspects;
     for (std::size_t i = 0; i < N; ++i) {
-      if (rotor_[i].log_odds > -params_.log_odds) candidates_ |= 1U << i;
+      if ((suspects >> i & 1U) != 0U) candidates_ |= rotor_[i].confounded_with;
     }
     ambiguous_since_ = ambiguous_.since;
   }
