@@ -97,23 +97,23 @@ Multirotor Simulation::perturbed(const Multirotor& nominal, const Realism& reali
 }
 
 Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, const Realism& realism,
-                       std::uint64_t seed)
+                       Seeds seeds)
     : realism_{realism},
       scenario_{scenario},
       number_of_{order_by_position(nominal)},
       place_of_{},
-      dynamics_{perturbed(nominal, realism, seed)},
+      dynamics_{perturbed(nominal, realism, seeds.vehicle)},
       hover_thrust_N_{dynamics_.vehicle().mass_kg * kGravity_m_s2},
-      plan_{scenario, Random{seed, "set-points"}},
+      plan_{scenario, Random{seeds.flight, "set-points"}},
       controller_{reordered(nominal)},
-      gusts_{steady_wind(realism, seed), Random{seed, "gusts"}},
+      gusts_{steady_wind(realism, seeds.flight), Random{seeds.flight, "gusts"}},
       imu_{realism.imu,
            {nominal.imu_position_m[0], nominal.imu_position_m[1], nominal.imu_position_m[2]},
            kPhysicsStep_s,
-           seed},
-      esc_{realism.esc, nominal.rotor_count, seed},
-      loss_{seed, "autopilot loss"},
-      desync_{seed, "desync"},
+           seeds.flight},
+      esc_{realism.esc, nominal.rotor_count, seeds.flight},
+      loss_{seeds.flight, "autopilot loss"},
+      desync_{seeds.flight, "desync"},
       command_delay_steps_{
           static_cast<std::size_t>(std::lround(realism.motor.command_latency_s / kControlStep_s))},
       state_{dynamics_.at_rest()},
@@ -125,16 +125,16 @@ Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, cons
   for (std::size_t place = 0; place < kMaxRotors; ++place) place_of_[number_of_[place]] = place;
   for (std::uint64_t axis = 0; axis < 3; ++axis) {
     attitude_error_.emplace_back(realism.autopilot.attitude_noise_rad, kAttitudeErrorTime_s,
-                                 Random{seed, "attitude", axis});
+                                 Random{seeds.flight, "attitude", axis});
     position_error_.emplace_back(realism.autopilot.position_noise_m, kPositionErrorTime_s,
-                                 Random{seed, "position", axis});
+                                 Random{seeds.flight, "position", axis});
     velocity_error_.emplace_back(realism.autopilot.velocity_noise_m_s, kVelocityErrorTime_s,
-                                 Random{seed, "velocity", axis});
+                                 Random{seeds.flight, "velocity", axis});
   }
   const Multirotor& vehicle = dynamics_.vehicle();
   const double hover_rad_s = dynamics_.hover_speed_rad_s();
   for (std::size_t place = 0; place < vehicle.rotor_count; ++place) {
-    Random random{seed, "rotor", place};
+    Random random{seeds.vehicle, "rotor", place};
     RotorInput& rotor = inputs_.rotor[place];
     thrust_error_[place] = factor(realism.rotor.thrust_error_ratio, random);
     time_constant_s_[place] =
@@ -145,7 +145,7 @@ Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, cons
     rotor.blade_pass_ratio = realism.rotor.blade_pass_ratio;
     state_.phase_rad[place] = random.uniform(0.0, 2.0 * std::numbers::pi);
     speed_error_.emplace_back(realism.motor.speed_error_ratio, realism.motor.speed_error_time_s,
-                              Random{seed, "speed error", place});
+                              Random{seeds.flight, "speed error", place});
   }
   drive_motors(ControlOutput{});
 }
@@ -318,21 +318,23 @@ void Simulation::drive_motors(const ControlOutput& control) {
   }
 }
 
+void Simulation::send_inertial(double time_s, Output& output) {
+  const ImuSample sample = imu_.sample(time_s, imu_fault());
+  if (!loss_.chance(realism_.imu.dropout_ratio) && link_is_up(Link::kAutopilot)) output.on_imu(sample);
+}
+
 void Simulation::send(Output& output) {
   if (!truth_is_told_) {
     truth_is_told_ = true;
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     if (scenario_.faults.empty()) output.on_truth({"", "none", -1.0, kNaN});
     for (const Fault& fault : scenario_.faults) {
-      output.on_truth({fault.component(), std::string{word_of(fault.kind)}, fault.onset_s, fault.magnitude});
+      output.on_truth({fault.component(), std::string{word_of(fault.kind)}, fault.onset_s,
+                       has_magnitude(fault.kind) ? fault.magnitude : kNaN});
     }
   }
   const bool autopilot_is_up = link_is_up(Link::kAutopilot);
   const double autopilot_loss = realism_.autopilot.dropout_ratio;
-  if (imu_schedule_.is_due(time_s_)) {
-    const ImuSample sample = imu_.sample(time_s_, imu_fault());
-    if (!loss_.chance(realism_.imu.dropout_ratio) && autopilot_is_up) output.on_imu(sample);
-  }
   if (esc_schedule_.is_due(time_s_))
     esc_.measure(time_s_, kFullSupply_V * sag(), state_.speed_rad_s, esc_faults());
   const bool esc_is_up = link_is_up(Link::kEsc);
@@ -377,6 +379,8 @@ void Simulation::step(Output& output) {
     dynamics_.step(state_, inputs_, kPhysicsStep_s);
     accelerations_ = dynamics_.accelerations(state_, inputs_);
     imu_.step(state_, accelerations_, thrust);
+    const double now_s = time_s_ + static_cast<double>(k + 1) * kPhysicsStep_s;
+    if (imu_schedule_.is_due(now_s)) send_inertial(now_s, output);
   }
   ++steps_;
   time_s_ = static_cast<double>(steps_) * kControlStep_s;

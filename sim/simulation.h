@@ -20,6 +20,16 @@
 
 namespace airworthy::sim {
 
+/// Where the random numbers of a flight come from: those that make the vehicle differ from its file, and those of
+/// the flight. The same vehicle can so fly twice.
+struct Seeds {
+  // NOLINTNEXTLINE(google-explicit-constructor): one seed stands for both.
+  Seeds(std::uint64_t both) : vehicle{both}, flight{both} {}
+  Seeds(std::uint64_t vehicle_seed, std::uint64_t flight_seed) : vehicle{vehicle_seed}, flight{flight_seed} {}
+  std::uint64_t vehicle;
+  std::uint64_t flight;
+};
+
 /// One simulated flight: physics at 4 kHz, control at 500 Hz, devices at their own rates, faults as the scenario
 /// says. The same vehicle, scenario, realism and seed give the same samples, bit for bit. Rotors are simulated
 /// in an order that depends on their positions only, and every random stream belongs to a position, so
@@ -29,7 +39,7 @@ class Simulation {
   static constexpr double kPhysicsStep_s = 1.0 / Realism::kPhysicsRate_Hz;
 
   /// `nominal` is what the vehicle file says; what flies differs from it by the errors of `realism`.
-  Simulation(const Multirotor& nominal, const Scenario& scenario, const Realism& realism, std::uint64_t seed);
+  Simulation(const Multirotor& nominal, const Scenario& scenario, const Realism& realism, Seeds seeds);
 
   /// One step of control: 2 ms.
   void step(Output& output);
@@ -53,6 +63,8 @@ class Simulation {
   [[nodiscard]] Estimate estimate();
   void drive_motors(const ControlOutput& control);
   void send(Output& output);
+  /// Any rate that divides the physics' is sampled at even steps.
+  void send_inertial(double time_s, Output& output);
   [[nodiscard]] bool link_is_up(Link link) const;
   [[nodiscard]] ImuFault imu_fault() const;
   [[nodiscard]] std::array<EscFault, kMaxRotors> esc_faults() const;

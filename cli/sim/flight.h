@@ -7,6 +7,7 @@
 #include "runtime/config/vehicle.h"
 #include "sim/config/realism.h"
 #include "sim/config/scenario.h"
+#include "sim/simulation.h"
 
 namespace airworthy::sim_command {
 
@@ -15,7 +16,7 @@ struct Flight {
   rt::VehicleFile vehicle;
   sim::Scenario scenario;
   sim::Realism realism;
-  std::uint64_t seed = 1;
+  sim::Seeds seeds{1};
   double duration_s = 0.0;
 };
 

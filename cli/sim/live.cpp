@@ -19,7 +19,7 @@ rt::Expected<LiveFlight> fly_live(const Flight& flight, const std::filesystem::p
   if (!terminal) return tl::unexpected<rt::Error>{terminal.error()};
   sim::MavlinkOutput output{[&](std::span<const std::uint8_t> bytes) { (*terminal)->write(bytes); },
                             flight.vehicle.multirotor->rotor_count};
-  sim::Simulation simulation{*flight.vehicle.multirotor, flight.scenario, flight.realism, flight.seed};
+  sim::Simulation simulation{*flight.vehicle.multirotor, flight.scenario, flight.realism, flight.seeds};
   LiveFlight result;
   timespec boottime{};
   clock_gettime(CLOCK_BOOTTIME, &boottime);

@@ -1,0 +1,379 @@
+#include "core/detectors/unbalance/rotor_unbalance_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+namespace airworthy {
+namespace {
+
+using Transition = FaultLifeCycle::Transition;
+
+constexpr double kGravity_m_s2 = 9.81;
+constexpr double kConverging_s = 0.5;
+constexpr double kSmoothing_s = 0.5;
+constexpr double kSigmas = 2.0;
+constexpr double kFrozen_s = 1.0;
+constexpr double kInertialStale_s = 1.0;
+constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
+constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
+constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
+constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
+
+SignalPowerParams power_params(const UnbalanceParams& params) {
+  SignalPowerParams power;
+  power.mass_kg = params.vehicle.mass_kg / params.response;
+  power.propeller_radius_m = params.vehicle.propeller_radius_m;
+  // The paper starts from what makes about half a m/s² at hover, 20 mg on its larger vehicles.
+  power.initial_tip_mass_mg =
+      1e6 * params.usual_m_s2 * UnbalanceMonitor::kg_m_per_m_s2(params) / params.vehicle.propeller_radius_m;
+  power.sensor.filter_cutoff_Hz = params.low_pass_Hz;
+  return power;
+}
+
+template <std::size_t N>
+std::array<double, N> first(const std::array<double, kMaxRotors>& all) {
+  std::array<double, N> result{};
+  std::copy_n(all.begin(), N, result.begin());
+  return result;
+}
+
+template <std::size_t... kIndex>
+std::array<FaultLifeCycle, sizeof...(kIndex)> life_cycles(const FaultLifeCycleParams& params,
+                                                          std::index_sequence<kIndex...>) {
+  return {(static_cast<void>(kIndex), FaultLifeCycle{params})...};
+}
+
+}  // namespace
+
+double UnbalanceMonitor::hover_speed_rad_s(const Multirotor& vehicle) noexcept {
+  return std::sqrt(vehicle.mass_kg * kGravity_m_s2 /
+                   (static_cast<double>(vehicle.rotor_count) * vehicle.thrust_coefficient_N_s2));
+}
+
+double UnbalanceMonitor::kg_m_per_m_s2(const UnbalanceParams& params) noexcept {
+  const double speed = hover_speed_rad_s(params.vehicle);
+  return params.vehicle.mass_kg / (params.response * speed * speed);
+}
+
+template <std::size_t N>
+RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) noexcept
+    : params_{params},
+      tracker_{{.reference_speed_rad_s = hover_speed_rad_s(params.vehicle),
+                .smallest_m_s2 = params.smallest_m_s2,
+                .speed_latency_s = params.speed_latency_s,
+                .speed_noise_ratio = params.speed_noise_ratio,
+                .low_pass_Hz = params.low_pass_Hz}},
+      fallback_{params.vehicle, power_params(params), first<N>(params.baseline_power)},
+      life_{life_cycles(params.life_cycle, std::make_index_sequence<N>{})},
+      ambiguity_life_{params.life_cycle} {
+  for (std::size_t i = 0; i < N; ++i) {
+    prior_.spin[i] = params.vehicle.rotor[i].spin;
+    prior_.amplitude_m_s2[i] =
+        params.has_baseline
+            ? std::hypot(params.baseline_m_s2[i], params.baseline_sigma_m_s2[i], 0.25 * params.smallest_m_s2)
+            : params.usual_m_s2;
+  }
+  prior_.against_ratio = params.against_ratio;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::on_phase(Phase phase) noexcept {
+  phase_ = phase;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept {
+  if (speed_rad_s.size() != N) return;
+  for (std::size_t i = 0; i < N; ++i) {
+    if (!std::isfinite(speed_rad_s[i])) continue;
+    if (speed_rad_s[i] != last_speed_rad_s_[i]) speed_changed_at_[i] = time;
+    last_speed_rad_s_[i] = speed_rad_s[i];
+  }
+  tracker_.on_speeds(time, std::span<const double, N>{speed_rad_s});
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::on_commands(TimePoint time, std::span<const double> command_ratio) noexcept {
+  if (command_ratio.size() == N) fallback_.on_commands(time, std::span<const double, N>{command_ratio});
+}
+
+template <std::size_t N>
+bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2,
+                                        double window_s) noexcept {
+  accel_at_ = time;
+  has_accel_ = true;
+  // A hard gust may look like a touch-down for a moment: what was learned before is not lost by that.
+  const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
+  if (flies && !is_tracking_) {
+    tracker_.forget();
+    estimated_s_ = 0.0;
+    power_m2_s4_.fill(0.0);
+    against_power_m2_s4_.fill(0.0);
+    fallback_.restart();
+    tracking_since_ = time;
+  }
+  is_tracking_ = flies;
+  if (flies) {
+    window_s_ = std::isfinite(window_s) ? window_s : 0.0;
+    fallback_.on_accel(time, a_x_m_s2, a_y_m_s2);
+    if (tracker_.on_accel(time, a_x_m_s2, a_y_m_s2, window_s_) == UpdateStatus::kFused) {
+      nis_ += 0.002 * (tracker_.innovation().nis() - nis_);
+    }
+  }
+  if (has_judged_ && time - judged_at_ < kPeriod) return false;
+  judge(time);
+  return true;
+}
+
+template <std::size_t N>
+bool RotorUnbalanceMonitor<N>::on_clock(TimePoint now) noexcept {
+  if (!has_accel_ || to_seconds(now - accel_at_) <= kInertialStale_s || now - judged_at_ < kPeriod)
+    return false;
+  is_tracking_ = false;
+  judge(now);
+  return true;
+}
+
+template <std::size_t N>
+bool RotorUnbalanceMonitor<N>::speeds_carry_the_vehicle() const noexcept {
+  double sum = 0.0;
+  for (const double speed : tracker_.speed_rad_s()) sum += speed * speed;
+  const double load =
+      params_.vehicle.thrust_coefficient_N_s2 * sum / (params_.vehicle.mass_kg * kGravity_m_s2);
+  return load > 1.0 / kMostLoad && load < kMostLoad;
+}
+
+template <std::size_t N>
+UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const noexcept {
+  if (to_seconds(now - accel_at_) > kInertialStale_s) return UnbalanceNotJudged::kInertialStale;
+  if (phase_ != Phase::kInFlight) return UnbalanceNotJudged::kNotFlying;
+  const bool fuses = tracker_.counters().fused > fused_at_judgement_;
+  if (to_seconds(now - tracking_since_) < kConverging_s) return UnbalanceNotJudged::kConverging;
+  if (!fuses) return UnbalanceNotJudged::kSpeedUnknown;
+  const bool is_frozen = std::any_of(speed_changed_at_.begin(), speed_changed_at_.end(),
+                                     [now](TimePoint t) { return to_seconds(now - t) > kFrozen_s; });
+  if (is_frozen || !speeds_carry_the_vehicle()) return UnbalanceNotJudged::kSpeedImplausible;
+  return UnbalanceNotJudged::kJudged;
+}
+
+template <std::size_t N>
+std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor, bool is_informed) const noexcept {
+  const auto power = [this](std::size_t i, std::size_t j) {
+    double sum = 0.0;
+    for (std::size_t a = 0; a < 2; ++a) {
+      for (std::size_t b = 0; b < 2; ++b) {
+        const double element = tracker_.covariance_m2_s4(2 * i + a, 2 * j + b);
+        sum += element * element;
+      }
+    }
+    return sum;
+  };
+  std::uint32_t mask = 0;
+  for (std::size_t j = 0; j < N; ++j) {
+    if (j == rotor) continue;
+    const bool correlates =
+        power(rotor, j) > kConfounded * kConfounded * std::sqrt(power(rotor, rotor) * power(j, j));
+    if (!tracker_.are_apart(rotor, j) || (!is_informed && correlates)) {
+      mask |= 1U << j;
+    }
+  }
+  return mask;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
+  const double gain = [this] {
+    // What the sensors leave of the vibration at the mean speed; the high-pass is not theirs.
+    double speed = 0.0;
+    for (const double one : tracker_.speed_rad_s()) speed += one / static_cast<double>(N);
+    return SensorResponse<double>{0.0, params_.low_pass_Hz}.sensor(speed, window_s_).magnitude();
+  }();
+  // A running mean at first, so that the start at zero leaves no trace.
+  estimated_s_ += dt_s;
+  const double share = std::min(1.0, dt_s / std::min(estimated_s_, kSmoothing_s));
+  for (std::size_t k = 0; k < N; ++k) {
+    RotorUnbalance& rotor = rotor_[k];
+    rotor.by_power = false;
+    const double variance = tracker_.turning_variance_m2_s4(k);
+    const auto smoothed = [&](double& power, int spin) {
+      // Bounded below, or one moment without any knowledge would hide what is seen after it.
+      const double seen = std::max(tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance,
+                                   -params_.smallest_m_s2 * params_.smallest_m_s2);
+      power += share * (seen - power);
+      return std::sqrt(std::max(0.0, power));
+    };
+    rotor.amplitude_m_s2 = smoothed(power_m2_s4_[k], prior_.spin[k]);
+    rotor.against_m_s2 = smoothed(against_power_m2_s4_[k], -prior_.spin[k]);
+    rotor.sigma_m_s2 = std::sqrt(variance);
+    rotor.growth_m_s2 = rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[k] : 0.0);
+    rotor.growth_sigma_m_s2 = params_.has_baseline
+                                  ? std::hypot(rotor.sigma_m_s2, params_.baseline_sigma_m_s2[k])
+                                  : rotor.sigma_m_s2;
+    const bool is_informed = rotor.sigma_m_s2 < kLeastInformation * params_.smallest_m_s2 ||
+                             rotor.amplitude_m_s2 > 4.0 * rotor.sigma_m_s2;
+    rotor.confounded_with = confounded_with(k, is_informed);
+    rotor.reason = is_informed && rotor.confounded_with == 0U ? UnbalanceNotJudged::kJudged
+                   : !is_informed && gain < kLeastGain        ? UnbalanceNotJudged::kUnfitInertialData
+                   : rotor.confounded_with != 0U              ? UnbalanceNotJudged::kConfounded
+                                                              : UnbalanceNotJudged::kConverging;
+  }
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
+  for (std::size_t i = 0; i < N; ++i) {
+    RotorUnbalance& rotor = rotor_[i];
+    const double doubt = kSigmas * rotor.growth_sigma_m_s2;
+    // A usual unbalance that nobody has measured is no growth.
+    const double least =
+        params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
+    const bool is_judged = rotor.reason == UnbalanceNotJudged::kJudged;
+    grown_[i].step(!is_known_[i] && is_judged && rotor.growth_m_s2 - doubt > least, now);
+    if (is_known_[i]) {
+      // What was found stays found while another rotor might take its place.
+      rotor.test_ratio = is_judged ? (rotor.growth_m_s2 + doubt) / least : 1.0;
+    } else {
+      rotor.test_ratio = std::min((rotor.growth_m_s2 - doubt) / least,
+                                  grown_[i].for_s(params_.persistence_s, now) ? 1e9 : 0.999);
+      if (rotor.test_ratio >= 1.0) rotor.onset = grown_[i].since;
+    }
+    rotor.transition = life_[i].step(rotor.test_ratio, now);
+    is_known_[i] = life_[i].active();
+  }
+}
+
+template <std::size_t N>
+double RotorUnbalanceMonitor<N>::shared_growth_m_s2(std::size_t rotor) const noexcept {
+  // The filter deals out evenly what rotors share, so that it is the sum of their parts.
+  double sum = 0.0;
+  for (std::size_t j = 0; j < N; ++j) {
+    const bool shares = j == rotor || (rotor_[rotor].confounded_with >> j & 1U) != 0U;
+    if (!shares) continue;
+    if (is_known_[j]) return 0.0;  // it may all be of the one that is known
+    sum += tracker_.turning_m_s2(j, prior_.spin[j]).magnitude();
+    if (params_.has_baseline) sum -= params_.baseline_m_s2[j];
+  }
+  return sum;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_faulty) noexcept {
+  bool is_pinned = false;
+  double most_growth = 0.0;
+  std::uint32_t suspects = 0;
+  for (std::size_t i = 0; i < N; ++i) {
+    if (is_known_[i]) continue;
+    const RotorUnbalance& rotor = rotor_[i];
+    is_pinned = is_pinned || (rotor.log_odds >= params_.log_odds && rotor.confounded_with == 0U);
+    most_growth = std::max(most_growth, shared_growth_m_s2(i));
+    if (rotor.log_odds > -params_.log_odds) suspects |= 1U << i;
+  }
+  const bool is_nobodys =
+      log_odds_faulty > params_.log_odds && !is_pinned && most_growth > params_.smallest_m_s2;
+  ambiguous_.step(is_nobodys, now);
+  if (is_nobodys && !ambiguity_life_.active()) {
+    candidates_ = suspects;
+    for (std::size_t i = 0; i < N; ++i) {
+      if ((suspects >> i & 1U) != 0U) candidates_ |= rotor_[i].confounded_with;
+    }
+    ambiguous_since_ = ambiguous_.since;
+  }
+  const bool is_due = ambiguous_.for_s(params_.ambiguous_after_s, now);
+  ambiguity_ =
+      ambiguity_life_.step(ambiguity_life_.active() ? (is_nobodys ? 1.0 : 0.0) : (is_due ? 1.0 : 0.0), now);
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::judge_by_power(TimePoint now, double dt_s) noexcept {
+  const double m_s2_per_kg_m = 1.0 / kg_m_per_m_s2(params_);
+  const auto verdict = fallback_.judge(dt_s);
+  for (std::size_t i = 0; i < N; ++i) {
+    RotorUnbalance& rotor = rotor_[i];
+    rotor.by_power = true;
+    rotor.reason = UnbalanceNotJudged::kJudged;
+    rotor.amplitude_m_s2 = m_s2_per_kg_m * verdict.unbalance_kg_m[i];
+    rotor.sigma_m_s2 = rotor.growth_sigma_m_s2 = m_s2_per_kg_m * verdict.sigma_kg_m[i];
+    rotor.growth_m_s2 =
+        rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[i] : params_.usual_m_s2);
+    rotor.log_odds = verdict.evidence[i];
+    const bool is_grown = verdict.named == i && rotor.growth_m_s2 > params_.smallest_m_s2;
+    grown_[i].step(is_grown, now);
+    rotor.test_ratio = is_grown || is_known_[i] ? 1.0 : 0.0;
+    if (is_grown && !is_known_[i]) rotor.onset = now;
+    rotor.transition = life_[i].step(rotor.test_ratio, now);
+    is_known_[i] = life_[i].active();
+  }
+  ambiguous_.step(false, now);
+  ambiguity_ = ambiguity_life_.active() ? ambiguity_life_.step(1.0, now) : Transition::kNone;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::mute(UnbalanceNotJudged reason, TimePoint now) noexcept {
+  for (std::size_t i = 0; i < N; ++i) {
+    rotor_[i].reason = reason;
+    rotor_[i].test_ratio = 0.0;
+    rotor_[i].log_odds = 0.0;
+    grown_[i].step(false, now);
+    // What was found stays found while nobody looks.
+    rotor_[i].transition = life_[i].active() ? life_[i].step(1.0, now) : Transition::kNone;
+  }
+  ambiguous_.step(false, now);
+  ambiguity_ = ambiguity_life_.active() ? ambiguity_life_.step(1.0, now) : Transition::kNone;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
+  const double dt_s = has_judged_ ? to_seconds(now - judged_at_) : to_seconds(kPeriod);
+  judged_at_ = now;
+  has_judged_ = true;
+  const UnbalanceNotJudged reason = reason_for_all(now);
+  fused_at_judgement_ = tracker_.counters().fused;
+  const bool speeds_fail =
+      reason == UnbalanceNotJudged::kSpeedUnknown || reason == UnbalanceNotJudged::kSpeedImplausible;
+  if (speeds_fail && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
+    state_ = DetectorState::kMonitoring;
+    judge_by_power(now, dt_s);
+    return;
+  }
+  state_ = reason == UnbalanceNotJudged::kJudged       ? DetectorState::kMonitoring
+           : reason == UnbalanceNotJudged::kConverging ? DetectorState::kConverging
+                                                       : DetectorState::kMuted;
+  if (reason != UnbalanceNotJudged::kJudged) {
+    mute(reason, now);
+    return;
+  }
+  estimate(dt_s);
+  const auto verdict = Hypotheses::test(tracker_, prior_, is_known_, params_.smallest_m_s2);
+  for (std::size_t i = 0; i < N; ++i) rotor_[i].log_odds = verdict ? verdict->log_odds[i] : 0.0;
+  test_rotors(now);
+  test_ambiguity(now, verdict ? verdict->log_odds_faulty : 0.0);
+}
+
+template <std::size_t N>
+UnbalanceInnovation RotorUnbalanceMonitor<N>::innovation() const noexcept {
+  const auto& counters = tracker_.counters();
+  return {.nis = nis_,
+          .noise_m_s2 = std::sqrt(tracker_.noise_variance_m2_s4()),
+          .samples = counters.fused,
+          .samples_refused = counters.not_finite + counters.time_backward + counters.speed_unknown,
+          .speeds_refused = counters.speed_refused};
+}
+
+template <std::size_t N>
+std::array<double, kMaxRotors> RotorUnbalanceMonitor<N>::powers() const noexcept {
+  std::array<double, kMaxRotors> result{};
+  const auto powers = fallback_.powers();
+  std::copy(powers.begin(), powers.end(), result.begin());
+  return result;
+}
+
+template class RotorUnbalanceMonitor<3>;
+template class RotorUnbalanceMonitor<4>;
+template class RotorUnbalanceMonitor<5>;
+template class RotorUnbalanceMonitor<6>;
+template class RotorUnbalanceMonitor<7>;
+template class RotorUnbalanceMonitor<8>;
+
+}  // namespace airworthy

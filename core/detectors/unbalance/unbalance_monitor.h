@@ -1,0 +1,119 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/detectors/detector_state.h"
+#include "core/detectors/fault_life_cycle.h"
+#include "core/detectors/flight_phase.h"
+#include "core/time/time.h"
+#include "core/vehicle/multirotor.h"
+
+namespace airworthy {
+
+/// Amplitudes are accelerations of the whole vehicle at hover speed, m/s²; a mass m·r at the rotor makes
+/// response · m·r·ω₀² / vehicle mass of it.
+struct UnbalanceParams {
+  Multirotor vehicle;
+  double smallest_m_s2 = 0.4;         ///< advisory: growth over the baseline that is reported
+  double caution_m_s2 = 1.2;          ///< growth from which the vehicle should return
+  bool thresholds_are_masses = true;  ///< then they change with `response`
+  bool has_baseline = false;          ///< calibrated; otherwise every rotor is taken to have `usual_m_s2`
+  double usual_m_s2 = 0.5;            ///< of propellers nobody has measured
+  std::array<double, kMaxRotors> baseline_m_s2{};
+  std::array<double, kMaxRotors> baseline_sigma_m_s2{};
+  std::array<double, kMaxRotors> baseline_power{};  ///< of the signal-power filter, (U/U₀)²
+  double response = 1.0;       ///< acceleration felt / force over mass, mean of x and y, near the rotor speed
+  double against_ratio = 0.3;  ///< part of the vibration that turns against the rotor, of an uneven airframe
+  double low_pass_Hz = 0.0;    ///< of the accelerometer; 0 = not known
+  double speed_latency_s = 0.0;  ///< of the telemetry
+  double speed_noise_ratio = 0.004;
+  double log_odds = 9.2;           ///< of one certain rotor against everything else, to blame it: 10 000 to 1
+  double persistence_s = 0.5;      ///< of the growth before it is reported
+  double ambiguous_after_s = 5.0;  ///< of an unbalance that is nobody's yet, before it is reported as such
+  FaultLifeCycleParams life_cycle{.clear_ratio = 0.5, .clear_after = Duration{10'000'000}};
+};
+
+/// Why an unbalance of a rotor would not be seen now.
+enum class UnbalanceNotJudged : std::uint8_t {
+  kJudged,
+  kNotFlying,          ///< by the flight phase
+  kInertialStale,      ///< no inertial data for a second
+  kConverging,         ///< less than a second of data
+  kSpeedUnknown,       ///< rotor speeds missing, stale or too seldom
+  kSpeedImplausible,   ///< rotor speeds that do not carry the vehicle, or frozen
+  kUnfitInertialData,  ///< averaging, filter or rate of the accelerometer leave too little of the vibration
+  kConfounded,         ///< turns too much like another rotor
+};
+
+/// What is known of the unbalance of one rotor.
+struct RotorUnbalance {
+  double amplitude_m_s2 = 0.0;
+  double sigma_m_s2 = 0.0;
+  double against_m_s2 = 0.0;  ///< amplitude of the part that turns against the rotor
+  double growth_m_s2 = 0.0;   ///< over the baseline
+  double growth_sigma_m_s2 = 0.0;
+  bool by_power = false;    ///< by the signal-power filter, as the speeds of the rotors are not known
+  double log_odds = 0.0;    ///< that this rotor is out of balance, against everything else
+  double test_ratio = 0.0;  ///< alarm at 1
+  std::uint32_t confounded_with = 0;  ///< bit j: rotor j + 1 cannot be told from this one
+  UnbalanceNotJudged reason = UnbalanceNotJudged::kNotFlying;
+  FaultLifeCycle::Transition transition = FaultLifeCycle::Transition::kNone;
+  TimePoint onset{};
+};
+
+/// How well the tracker's model explains what is felt, for the log.
+struct UnbalanceInnovation {
+  double nis = 0.0;  ///< mean over 1 s; 2 where the model is right
+  double noise_m_s2 = 0.0;
+  std::int64_t samples = 0;
+  std::int64_t samples_refused = 0;
+  std::int64_t speeds_refused = 0;
+};
+
+/// The policy of rotor unbalance over order tracking: who is out of balance, by how much, how sure. Without usable
+/// speeds of the rotors it falls back to the signal-power filter, core/detectors/unbalance/power_fallback.h.
+///
+/// A rotor is reported when, for `persistence_s`, its growth over the baseline exceeds `smallest_m_s2` by two sigma
+/// and the odds that it is this rotor alone exceed `log_odds`. What is out of balance but cannot be pinned on one
+/// rotor for `ambiguous_after_s` is reported as such, with the candidates. Judged in flight only.
+class UnbalanceMonitor {
+ public:
+  static constexpr Duration kPeriod{100'000};  ///< of judging
+
+  UnbalanceMonitor(const UnbalanceMonitor&) = delete;
+  UnbalanceMonitor& operator=(const UnbalanceMonitor&) = delete;
+  virtual ~UnbalanceMonitor() = default;
+
+  virtual void on_phase(Phase phase) noexcept = 0;
+  /// rad/s; NaN = not in this report. A report for another number of rotors is refused.
+  virtual void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept = 0;
+  /// Commands, 0 … 1, for the time when no speeds come.
+  virtual void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept = 0;
+  /// Horizontal specific force in the body frame. True when the vehicle was judged anew.
+  virtual bool on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2, double window_s) noexcept = 0;
+
+  /// The clock, for the time when no inertial data come. True when the vehicle was judged anew.
+  virtual bool on_clock(TimePoint now) noexcept = 0;
+
+  [[nodiscard]] virtual DetectorState state() const noexcept = 0;
+  [[nodiscard]] virtual TimePoint judged_at() const noexcept = 0;
+  [[nodiscard]] virtual std::span<const RotorUnbalance> rotors() const noexcept = 0;
+  /// The unbalance that is nobody's yet: its life, and who may have it (bit j: rotor j + 1).
+  [[nodiscard]] virtual FaultLifeCycle::Transition ambiguity() const noexcept = 0;
+  [[nodiscard]] virtual std::uint32_t candidates() const noexcept = 0;
+  [[nodiscard]] virtual TimePoint ambiguous_since() const noexcept = 0;
+  [[nodiscard]] virtual UnbalanceInnovation innovation() const noexcept = 0;
+  /// What the signal-power filter has learned of each rotor, (U/U₀)²: UnbalanceParams::baseline_power for a calibration.
+  [[nodiscard]] virtual std::array<double, kMaxRotors> powers() const noexcept = 0;
+
+  /// Mass times radius that makes an amplitude of 1 m/s² at hover speed. kg·m.
+  [[nodiscard]] static double kg_m_per_m_s2(const UnbalanceParams& params) noexcept;
+  [[nodiscard]] static double hover_speed_rad_s(const Multirotor& vehicle) noexcept;
+
+ protected:
+  UnbalanceMonitor() = default;
+};
+
+}  // namespace airworthy
