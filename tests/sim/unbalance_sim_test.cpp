@@ -60,18 +60,16 @@ class Judge final : public Output {
   void on_flight_state(const AutopilotSample&, LandedState) override {}
 
   struct Amplitude {
-    double mean = 0.0;
-    double sigma = 0.0;
     double magnitude_sum = 0.0;
     double square_sum = 0.0;
     int count = 0;
   };
 
   std::uint32_t blamed = 0;      ///< bit i: rotor i + 1
-  double blamed_after_s = -1.0;  ///< the first, since the vehicle flies
+  double blamed_at_s = -1.0;     ///< the first
+  double blamed_after_s = -1.0;  ///< the same, since the vehicle flies
   std::uint32_t candidates = 0;  ///< of an unbalance that is nobody's
   std::array<Amplitude, kMaxRotors> amplitude{};
-  std::array<double, kMaxRotors> largest_log_odds{};
   [[nodiscard]] const UnbalanceMonitor& monitor() const { return *monitor_; }
 
  private:
@@ -80,7 +78,10 @@ class Judge final : public Output {
       const RotorUnbalance& rotor = monitor_->rotors()[i];
       if (rotor.transition == Transition::kRaise) {
         blamed |= 1U << i;
-        if (blamed_after_s < 0.0) blamed_after_s = time_s - flies_since_s_;
+        if (blamed_at_s < 0.0) {
+          blamed_at_s = time_s;
+          blamed_after_s = time_s - flies_since_s_;
+        }
       }
       if (flies_ && time_s - flies_since_s_ > 5.0 && rotor.reason == UnbalanceNotJudged::kJudged) {
         amplitude[i].magnitude_sum += rotor.amplitude_m_s2;
@@ -123,7 +124,7 @@ UnbalanceParams calibrated(const Multirotor& vehicle, const Realism& realism, st
   params.has_baseline = true;
   for (std::size_t i = 0; i < vehicle.rotor_count; ++i) {
     const auto& amplitude = judge.amplitude[i];
-    EXPECT_GT(amplitude.count, 200) << "rotor " << i + 1;
+    EXPECT_GT(amplitude.count, 100) << "rotor " << i + 1;
     const double mean = amplitude.magnitude_sum / std::max(1, amplitude.count);
     params.baseline_m_s2[i] = mean;
     params.baseline_sigma_m_s2[i] =
@@ -186,18 +187,31 @@ Realism still() {
   return realism;
 }
 
+TEST(UnbalanceSim, AChipInMidFlightIsFoundWithinThreeSeconds) {
+  const Realism hard = Realism::at(Level::kHard);
+  constexpr double kOnset_s = 10.0;
+  for (const Case& one : kCases) {
+    const Multirotor vehicle = vehicle_named(one.vehicle);
+    Judge judge{calibrated(vehicle, hard, 4)};
+    Scenario scenario = plan(Manoeuvre::kRandom, 12.0, 3, one.tip_mass_mg);
+    scenario.faults[0].onset_s = kOnset_s;
+    fly(judge, vehicle, scenario, hard, {4, 70});
+    EXPECT_EQ(judge.blamed, 0b0100U) << one.vehicle;
+    EXPECT_GT(judge.blamed_at_s, kOnset_s) << one.vehicle;
+    EXPECT_LT(judge.blamed_at_s, kOnset_s + 3.0) << one.vehicle;
+    std::printf("%-17s chips: rotor 3 after %.2f s\n", one.vehicle, judge.blamed_at_s - kOnset_s);
+  }
+}
+
 TEST(UnbalanceSim, HoveringInStillAirNobodyIsBlamed) {
   for (const Case& one : kCases) {
     const Multirotor vehicle = vehicle_named(one.vehicle);
-    const UnbalanceParams params = calibrated(vehicle, Realism::at(Level::kHard), 3);
-    Judge judge{params};
+    Judge judge{calibrated(vehicle, Realism::at(Level::kHard), 3)};
     fly(judge, vehicle, plan(Manoeuvre::kHover, 16.0, 2, one.tip_mass_mg), still(), {3, 60});
-    std::printf("%s, still hover: blamed %u after %.2f s, candidates %u\n", one.vehicle, judge.blamed,
-                judge.blamed_after_s, judge.candidates);
-    for (const auto& r : judge.monitor().rotors())
-      std::printf("   amp %.3f sigma %.3f lo %.1f reason %d conf %u\n", r.amplitude_m_s2, r.sigma_m_s2,
-                  r.log_odds, static_cast<int>(r.reason), r.confounded_with);
-    EXPECT_EQ(judge.blamed & ~2U, 0U) << one.vehicle;
+    EXPECT_EQ(judge.blamed, 0U) << one.vehicle;
+    // Rotors 1 and 2 of the quadrotors, 2 and 4 of the hexarotor turn the same way at the same speed.
+    EXPECT_EQ(judge.monitor().rotors()[1].reason, UnbalanceNotJudged::kConfounded) << one.vehicle;
+    EXPECT_NE(judge.monitor().rotors()[1].confounded_with, 0U) << one.vehicle;
   }
 }
 
