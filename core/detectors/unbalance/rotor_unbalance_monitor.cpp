@@ -18,6 +18,7 @@ constexpr double kFrozen_s = 1.0;
 constexpr double kInertialStale_s = 1.0;
 constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
+constexpr double kLeak = 0.05;             // of another rotor's amplitude, that no sigma knows of
 constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
 constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
 
@@ -192,7 +193,8 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
   }();
   // A running mean at first, so that the start at zero leaves no trace.
   estimated_s_ += dt_s;
-  const double share = std::min(1.0, dt_s / std::min(estimated_s_, kSmoothing_s));
+  // What was seen while the tracker was at a loss must not linger.
+  const double share = tracker_.explains() ? std::min(1.0, dt_s / std::min(estimated_s_, kSmoothing_s)) : 1.0;
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];
     rotor.by_power = false;
@@ -222,21 +224,31 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
 }
 
 template <std::size_t N>
+double RotorUnbalanceMonitor<N>::largest_but(std::size_t rotor) const noexcept {
+  double largest = 0.0;
+  for (std::size_t j = 0; j < N; ++j) {
+    if (j != rotor) largest = std::max(largest, rotor_[j].amplitude_m_s2);
+  }
+  return largest;
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
   for (std::size_t i = 0; i < N; ++i) {
     RotorUnbalance& rotor = rotor_[i];
     const double doubt = kSigmas * rotor.growth_sigma_m_s2;
+    const double surely_grown = rotor.growth_m_s2 - doubt - kLeak * largest_but(i);
     // A usual unbalance that nobody has measured is no growth.
     const double least =
         params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
     const bool is_judged = rotor.reason == UnbalanceNotJudged::kJudged;
-    grown_[i].step(!is_known_[i] && is_judged && rotor.growth_m_s2 - doubt > least, now);
+    grown_[i].step(!is_known_[i] && is_judged && tracker_.explains() && surely_grown > least, now);
     if (is_known_[i]) {
       // What was found stays found while another rotor might take its place.
       rotor.test_ratio = is_judged ? (rotor.growth_m_s2 + doubt) / least : 1.0;
     } else {
-      rotor.test_ratio = std::min((rotor.growth_m_s2 - doubt) / least,
-                                  grown_[i].for_s(params_.persistence_s, now) ? 1e9 : 0.999);
+      rotor.test_ratio =
+          std::min(surely_grown / least, grown_[i].for_s(params_.persistence_s, now) ? 1e9 : 0.999);
       if (rotor.test_ratio >= 1.0) rotor.onset = grown_[i].since;
     }
     rotor.transition = life_[i].step(rotor.test_ratio, now);

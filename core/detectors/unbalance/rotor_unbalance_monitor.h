@@ -52,6 +52,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   void mute(UnbalanceNotJudged reason, TimePoint now) noexcept;
   [[nodiscard]] UnbalanceNotJudged reason_for_all(TimePoint now) const noexcept;
   [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor, bool is_informed) const noexcept;
+  [[nodiscard]] double largest_but(std::size_t rotor) const noexcept;
   /// Growth of a rotor together with those it cannot be told from.
   [[nodiscard]] double shared_growth_m_s2(std::size_t rotor) const noexcept;
   [[nodiscard]] bool speeds_carry_the_vehicle() const noexcept;

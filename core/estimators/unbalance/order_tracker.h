@@ -41,7 +41,8 @@ struct OrderTrackerParams {
 ///              and R; θᵢ → phase_ [rad]; s = +1 clockwise seen from above; G → SensorResponse
 ///   Deviations innovations beyond 4σ are cut there (impacts); samples wait until every rotor's speed is known on
 ///              both sides of their time, at most 0.15 s; a gap in the samples or the speeds that breaks the phases
-///              forgets the amplitudes; which rotors P may be trusted to tell apart is RotorSeparation's to say
+///              forgets the amplitudes; a mean NIS above 10 over 0.2 s (a propeller chips) sets P to P₀, once a second
+///              at most; which rotors P may be trusted to tell apart is RotorSeparation's to say
 ///   Frames     body, x forward, y right; specific force, m/s²
 ///   Valid for  Δt in [0.5 ms, 0.1 s]; N in 3 … 8; speeds reported at ≥ 4 Hz; cost: 6·(2N)² + 60·N flops, no heap
 template <class Scalar, std::size_t N>
@@ -66,6 +67,7 @@ class OrderTracker {
     std::int64_t speed_refused = 0;  ///< a report older than the one before it
     std::int64_t speed_unknown = 0;  ///< samples without the speed of every rotor
     std::int64_t cut = 0;            ///< innovations beyond 4σ
+    std::int64_t reopened = 0;       ///< sudden changes
   };
 
   explicit OrderTracker(const OrderTrackerParams<Scalar>& params) noexcept
@@ -77,8 +79,7 @@ class OrderTracker {
 
   /// Amplitudes as before the first sample; speeds and phases go on.
   void forget() noexcept {
-    for (auto& row : P_) row.fill(0);
-    for (std::size_t i = 0; i < kStates; ++i) P(i, i) = prior_variance_m2_s4();
+    reopen();
     separation_.reset();
     x_.fill(0);
     y_.fill(0);
@@ -138,6 +139,8 @@ class OrderTracker {
   [[nodiscard]] bool are_apart(std::size_t i, std::size_t j) const noexcept {
     return separation_.are_apart(i, j);
   }
+  /// Whether the model explains what was felt in the last 0.2 s: not in a sudden change, nor before R is learned.
+  [[nodiscard]] bool explains() const noexcept { return change_nis_ < kExplainedNis; }
   /// The speed of each rotor at the newest fused sample. rad/s.
   [[nodiscard]] const std::array<Scalar, N>& speed_rad_s() const noexcept { return speed_; }
 
@@ -149,6 +152,10 @@ class OrderTracker {
   static constexpr Scalar kLongestStep_s = static_cast<Scalar>(0.1);
   static constexpr Scalar kMostSigmas = 4;
   static constexpr Scalar kNoiseTime_s = 1;
+  static constexpr Scalar kChangeTime_s = static_cast<Scalar>(0.2);
+  static constexpr Scalar kChangeNis = 10;
+  static constexpr Scalar kExplainedNis = 4;
+  static constexpr Scalar kChangeRest_s = 1;
   static constexpr Scalar kPhaseWalk_rad2_s = static_cast<Scalar>(0.01);
   static constexpr Scalar kTwoPi = static_cast<Scalar>(6.283185307179586);
 
@@ -167,6 +174,24 @@ class OrderTracker {
   }
   static Phasor<Scalar> state(const Vector& v, std::size_t rotor) noexcept {
     return {v[2 * rotor], v[2 * rotor + 1]};
+  }
+
+  void reopen() noexcept {
+    for (auto& row : P_) row.fill(0);
+    for (std::size_t i = 0; i < kStates; ++i) P(i, i) = prior_variance_m2_s4();
+    change_nis_ = 2;
+    since_reopened_s_ = 0;
+  }
+
+  /// What the walk of (2) cannot follow: without it the cut would let the amplitudes creep, the noise swell, and
+  /// another rotor take the share that the right one lacks. Values are cut as innovations are: an impact is no change.
+  void watch_for_change(Scalar dt_s) noexcept {
+    const Scalar nis = std::min(innovation_.nis(), Scalar{2} * kMostSigmas * kMostSigmas);
+    change_nis_ += dt_s / (kChangeTime_s + dt_s) * (nis - change_nis_);
+    since_reopened_s_ += dt_s;
+    if (change_nis_ < kChangeNis || since_reopened_s_ < kChangeRest_s) return;
+    reopen();
+    ++counters_.reopened;
   }
 
   [[nodiscard]] bool need_not_wait(TimePoint time) const noexcept {
@@ -284,6 +309,7 @@ class OrderTracker {
       }
     }
     learn_noise(S, dt_s);
+    watch_for_change(dt_s);
   }
 
   [[nodiscard]] Scalar power() const noexcept {
@@ -323,6 +349,8 @@ class OrderTracker {
   Vector x_{};
   Vector y_{};
   Scalar R_ = 0;
+  Scalar change_nis_ = 2;
+  Scalar since_reopened_s_ = 0;
   Innovation innovation_;
   Counters counters_;
 };

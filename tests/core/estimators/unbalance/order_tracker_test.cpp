@@ -112,6 +112,7 @@ class Flight {
   double power_sum = 0.0;
   int samples = 0;
 
+  void change(const World& world) { world_ = world; }
   [[nodiscard]] double covariance(std::size_t i, std::size_t j) const {
     return static_cast<double>(tracker.covariance_m2_s4(i, j));
   }
@@ -720,14 +721,35 @@ TEST(OrderTracker, AWrongLatencyCostsAsMuchAsTheSpeedChangesWithinIt) {
 
 TEST(OrderTracker, AnImpactIsCut) {
   World world{4, 500.0};
+  world.noise_m_s2 = 0.3;
   Flight<double, 4> flight{world};
   flight.fly(4.0);
   const Complex before = complex(flight.tracker.x_m_s2(2));
-  (void)flight.tracker.on_accel(at(flight.time_s), 150.0, 150.0, 0.0);
+  (void)flight.tracker.on_accel(at(flight.time_s), 50.0, 50.0, 0.0);
   flight.time_s += 0.002;
   flight.fly(0.1);
   EXPECT_GT(flight.tracker.counters().cut, 0);
+  EXPECT_EQ(flight.tracker.counters().reopened, 0);
   EXPECT_LT(std::abs(complex(flight.tracker.x_m_s2(2)) - before), 0.3);
+}
+
+TEST(OrderTracker, ASuddenChangeIsFollowedAtOnceAndLeavesTheOthersAlone) {
+  World world{4, 500.0};
+  world.noise_m_s2 = 0.3;
+  Flight<double, 4> flight{world};
+  flight.fly(4.0);
+  ASSERT_EQ(flight.tracker.counters().reopened, 0);
+  const Complex y_over_x = world.y[1] / world.x[1];
+  world.x[1] = std::polar(15.0, 0.4);
+  world.y[1] = y_over_x * world.x[1];
+  flight.change(world);
+  flight.fly(1.0);
+  EXPECT_EQ(flight.tracker.counters().reopened, 1);
+  EXPECT_NEAR(std::abs(complex(flight.tracker.x_m_s2(1))), 15.0, 0.8);
+  for (const std::size_t other : {0U, 2U, 3U}) {
+    EXPECT_NEAR(std::abs(complex(flight.tracker.x_m_s2(other))), std::abs(world.x[other]),
+                4.0 * std::sqrt(flight.covariance(2 * other, 2 * other)));
+  }
 }
 
 }  // namespace
