@@ -14,7 +14,9 @@ constexpr double kGravity_m_s2 = 9.81;
 constexpr double kConverging_s = 0.5;
 constexpr double kSmoothing_s = 0.5;
 constexpr double kSigmas = 2.0;
-constexpr double kFrozen_s = 1.0;
+constexpr double kFrozen_s = 0.5;  // without a change ...
+constexpr int kFrozenChanges =
+    10;  // while each of the others changed so often, on average: a coarse scale is not frozen
 constexpr double kInertialStale_s = 1.0;
 constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
@@ -89,8 +91,11 @@ void RotorUnbalanceMonitor<N>::on_speeds(TimePoint time, std::span<const double>
   if (speed_rad_s.size() != N) return;
   for (std::size_t i = 0; i < N; ++i) {
     if (!std::isfinite(speed_rad_s[i])) continue;
-    if (speed_rad_s[i] != last_speed_rad_s_[i]) speed_changed_at_[i] = time;
+    if (speed_rad_s[i] == last_speed_rad_s_[i]) continue;
     last_speed_rad_s_[i] = speed_rad_s[i];
+    speed_changed_at_[i] = time;
+    for (int& changes : changes_of_others_) ++changes;
+    changes_of_others_[i] = 0;
   }
   tracker_.on_speeds(time, std::span<const double, N>{speed_rad_s});
 }
@@ -153,8 +158,11 @@ UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const
   const bool fuses = tracker_.counters().fused > fused_at_judgement_;
   if (to_seconds(now - tracking_since_) < kConverging_s) return UnbalanceNotJudged::kConverging;
   if (!fuses) return UnbalanceNotJudged::kSpeedUnknown;
-  const bool is_frozen = std::any_of(speed_changed_at_.begin(), speed_changed_at_.end(),
-                                     [now](TimePoint t) { return to_seconds(now - t) > kFrozen_s; });
+  bool is_frozen = false;
+  for (std::size_t i = 0; i < N; ++i) {
+    is_frozen = is_frozen || (to_seconds(now - speed_changed_at_[i]) > kFrozen_s &&
+                              changes_of_others_[i] > kFrozenChanges * static_cast<int>(N - 1));
+  }
   if (is_frozen || !speeds_carry_the_vehicle()) return UnbalanceNotJudged::kSpeedImplausible;
   return UnbalanceNotJudged::kJudged;
 }

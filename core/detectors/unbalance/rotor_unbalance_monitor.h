@@ -87,6 +87,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   std::int64_t fused_at_judgement_ = 0;
   std::array<double, N> last_speed_rad_s_{};
   std::array<TimePoint, N> speed_changed_at_{};
+  std::array<int, N> changes_of_others_{};  ///< reports that changed since this rotor's last did
 };
 
 extern template class RotorUnbalanceMonitor<3>;
