@@ -39,7 +39,7 @@ class SpeedTrack {
   /// The speed at `time`, held before the oldest and beyond the newest report. Empty without any report.
   [[nodiscard]] std::optional<Value> at(TimePoint time) const noexcept {
     if (count_ == 0) return std::nullopt;
-    if (time >= newest_time()) {
+    if (time > newest_time()) {
       return Value{report_[index(0)].speed_rad_s, seconds(time - newest_time())};
     }
     for (std::size_t back = 1; back < count_; ++back) {
