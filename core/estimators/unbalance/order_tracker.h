@@ -68,8 +68,8 @@ class OrderTracker {
 
   explicit OrderTracker(const OrderTrackerParams<Scalar>& params) noexcept
       : params_{params},
-        response_{std::min(params.reference_speed_rad_s / Scalar{6}, kMostHighPass_rad_s),
-                  params.low_pass_Hz} {
+        // Two poles at a third of the hover speed: the vehicle's own motion and the mount's reach 50 Hz.
+        response_{params.reference_speed_rad_s / Scalar{3}, params.low_pass_Hz} {
     forget();
   }
 
@@ -136,7 +136,6 @@ class OrderTracker {
 
  private:
   static constexpr std::size_t kMostWaiting = 128;
-  static constexpr Scalar kMostHighPass_rad_s = 75;
   static constexpr Duration kLongestWait{150'000};
   static constexpr Scalar kSpeedUnknown_s = static_cast<Scalar>(0.3);
   static constexpr Scalar kLongestStep_s = static_cast<Scalar>(0.1);
