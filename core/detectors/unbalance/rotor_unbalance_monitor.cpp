@@ -39,6 +39,7 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
                 .smallest_m_s2 = params.smallest_m_s2,
                 .speed_latency_s = params.speed_latency_s,
                 .speed_noise_ratio = params.speed_noise_ratio,
+                .most_speed_error_ratio = params.most_speed_error_ratio,
                 .low_pass_Hz = params.low_pass_Hz}},
       life_{[&]<std::size_t... kIndex>(std::index_sequence<kIndex...>){return std::array<FaultLifeCycle, N>{
           (static_cast<void>(kIndex), FaultLifeCycle{params.life_cycle})...};
@@ -47,6 +48,7 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
 }
 , ambiguity_life_{params.life_cycle} {
   for (std::size_t i = 0; i < N; ++i) {
+    tracker_.start_speed_error(i, params.speed_error_ratio[i]);
     prior_.spin[i] = params.vehicle.rotor[i].spin;
     prior_.amplitude_m_s2[i] =
         params.has_baseline
@@ -247,11 +249,14 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
 template <std::size_t N>
 UnbalanceInnovation RotorUnbalanceMonitor<N>::innovation() const noexcept {
   const auto& counters = tracker_.counters();
+  std::array<double, kMaxRotors> speed_error_ratio{};
+  for (std::size_t i = 0; i < N; ++i) speed_error_ratio[i] = tracker_.speed_error_ratio(i);
   return {.nis = nis_,
           .noise_m_s2 = std::sqrt(tracker_.noise_variance_m2_s4()),
           .samples = counters.fused,
           .samples_refused = counters.not_finite + counters.time_backward + counters.speed_unknown,
-          .speeds_refused = counters.speed_refused};
+          .speeds_refused = counters.speed_refused,
+          .speed_error_ratio = speed_error_ratio};
 }
 
 template class RotorUnbalanceMonitor<3>;

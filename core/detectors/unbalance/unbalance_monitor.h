@@ -27,6 +27,10 @@ struct UnbalanceParams {
   double low_pass_Hz = 0.0;    ///< of the accelerometer; 0 = not known
   double speed_latency_s = 0.0;  ///< of the telemetry
   double speed_noise_ratio = 0.004;
+  std::array<double, kMaxRotors>
+      speed_error_ratio{};  ///< true over reported speed, less 1: clocks of the controllers
+  double most_speed_error_ratio =
+      0.0;                         ///< that it may be off the above; followed in flight, 0 = not followed
   double log_odds = 9.2;           ///< of one certain rotor against everything else, to blame it: 10 000 to 1
   double persistence_s = 0.5;      ///< of the growth before it is reported
   double ambiguous_after_s = 5.0;  ///< of an unbalance that is nobody's yet, before it is reported as such
@@ -65,6 +69,7 @@ struct UnbalanceInnovation {
   std::int64_t samples = 0;
   std::int64_t samples_refused = 0;
   std::int64_t speeds_refused = 0;
+  std::array<double, kMaxRotors> speed_error_ratio{};  ///< as learned
 };
 
 /// The policy of rotor unbalance over order tracking: who is out of balance, by how much, how sure.
