@@ -144,7 +144,7 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     // What the sensors leave of the vibration at the mean speed; the high-pass is not theirs.
     double speed = 0.0;
     for (const double one : tracker_.speed_rad_s()) speed += one / static_cast<double>(N);
-    return SensorResponse<double>{0.0, params_.low_pass_Hz}.at(speed, 0.0, window_s_).magnitude();
+    return SensorResponse<double>{0.0, params_.low_pass_Hz}.of_sensor(speed, window_s_).magnitude();
   }();
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];

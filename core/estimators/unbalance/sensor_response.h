@@ -44,7 +44,12 @@ class SensorResponse {
     const SinCos<Scalar> z = sincos(speed_rad_s * dt_s);
     const Phasor<Scalar> step{Scalar{1} - z.cos, z.sin};
     const Phasor<Scalar> once = alpha_ * step / Phasor<Scalar>{Scalar{1} - alpha_ * z.cos, alpha_ * z.sin};
-    Phasor<Scalar> gain = once * once;
+    return once * once * of_sensor(speed_rad_s, window_s);
+  }
+
+  /// (2)·(3): what the sensor leaves, before anything is sampled.
+  [[nodiscard]] Phasor<Scalar> of_sensor(Scalar speed_rad_s, Scalar window_s) const noexcept {
+    Phasor<Scalar> gain{1, 0};
     if (low_pass_rad_s_ > Scalar{0}) {
       const Scalar x = speed_rad_s / low_pass_rad_s_;
       gain = gain / Phasor<Scalar>{Scalar{1} - x * x, static_cast<Scalar>(1.4142135623730951) * x};
