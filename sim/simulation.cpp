@@ -324,7 +324,8 @@ void Simulation::send(Output& output) {
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     if (scenario_.faults.empty()) output.on_truth({"", "none", -1.0, kNaN});
     for (const Fault& fault : scenario_.faults) {
-      output.on_truth({fault.component(), std::string{word_of(fault.kind)}, fault.onset_s, fault.magnitude});
+      output.on_truth({fault.component(), std::string{word_of(fault.kind)}, fault.onset_s,
+                       has_magnitude(fault.kind) ? fault.magnitude : kNaN});
     }
   }
   const bool autopilot_is_up = link_is_up(Link::kAutopilot);

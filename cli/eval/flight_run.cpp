@@ -28,8 +28,8 @@ class TickSource {
 
 }  // namespace
 
-rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseConfig config,
-                                TickObserver observer) {
+rt::Expected<Flight> run_flight(const std::string& log_path, const std::string& process,
+                                const MakeDetector& make) {
   const auto contents = rt::LogBus::survey(log_path);
   if (!contents) return tl::unexpected{contents.error()};
   auto bus = rt::LogBus::open(log_path);
@@ -61,10 +61,8 @@ rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseC
     started = true;
   });
 
-  config.vehicle = contents->vehicle;
-  rt::Node detector_node{**bus, clock, log, {contents->vehicle, "airworthy-response", 1}};
-  response::ResponseService service{detector_node, config};
-  if (observer) service.observe_ticks(std::move(observer));
+  rt::Node detector_node{**bus, clock, log, {contents->vehicle, process, 1}};
+  const Detector detector = make(detector_node);
   std::optional<TickSource> ticks;
   if (!contents->has(node.full_name(channel::kTick.info))) ticks.emplace(node);
 
@@ -76,6 +74,16 @@ rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseC
   });
   if (!played) return tl::unexpected{played.error()};
   return flight;
+}
+
+rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseConfig config,
+                                TickObserver observer) {
+  return run_flight(log_path, "airworthy-response", [&](rt::Node& node) {
+    config.vehicle = node.identity().vehicle;
+    auto service = std::make_shared<response::ResponseService>(node, config);
+    if (observer) service->observe_ticks(observer);
+    return service;
+  });
 }
 
 }  // namespace airworthy::eval

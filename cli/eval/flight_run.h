@@ -1,20 +1,31 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "cli/eval/scoring.h"
 #include "runtime/error.h"
+#include "runtime/process/node.h"
 #include "services/response/response_config.h"
 
 namespace airworthy::eval {
 
-/// Sees the detector after each of its ticks.
+/// A detector's service, alive while a flight plays.
+using Detector = std::shared_ptr<void>;
+/// Puts a detector on a node of the flight's vehicle.
+using MakeDetector = std::function<Detector(rt::Node& node)>;
+
+/// Runs a detector over one log, on message time, in this process, and collects its alarms. `process` is the name
+/// under which the detector speaks. Only channels with role `input` reach the detector; GROUND_TRUTH goes to the
+/// scoring alone. Safe to call from several threads.
+[[nodiscard]] rt::Expected<Flight> run_flight(const std::string& log_path, const std::string& process,
+                                              const MakeDetector& make);
+
+/// Sees the response detector after each of its ticks.
 using TickObserver = std::function<void(const response::ResponseMonitor&)>;
 
-/// Runs the response detector over one log, on message time, in this process, and collects its alarms. Only
-/// channels with role `input` reach the detector; GROUND_TRUTH goes to the scoring alone. Safe to call from
-/// several threads.
+/// The same with the response detector.
 [[nodiscard]] rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseConfig config,
                                               TickObserver observer = {});
 

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "cli/eval/detectors.h"
 #include "cli/eval/flight_run.h"
 #include "cli/eval/nested.h"
 #include "cli/eval/report.h"
@@ -39,13 +40,9 @@ std::vector<rt::Expected<eval::Flight>> run_all(const std::vector<std::string>& 
   return flights;
 }
 
-int run(int argc, char** argv) {
-  CLI::App app{
-      "Runs the configured detectors over recorded flights, on message time, and scores them against the "
-      "truth "
-      "in the logs.",
-      "airworthy eval"};
+struct Options {
   std::vector<std::string> logs;
+  std::string detector = eval::detector_names().front();
   std::string config_path;
   std::vector<std::string> overrides;
   std::string calibration_path;
@@ -53,60 +50,112 @@ int run(int argc, char** argv) {
   bool nested = false;
   bool json = false;
   calibrate::LearningParams learning;
-  learning.jobs = std::max(1U, std::thread::hardware_concurrency());
-  app.add_option("LOG", logs, "LCM logs, for example from 'airworthy import'")->required();
-  app.add_option("--config", config_path, "configuration of airworthy-response")->required();
-  app.add_option("--set", overrides, "override of a key, as KEY=VALUE; repeatable")->allow_extra_args(false);
-  auto* calibration_option =
-      app.add_option("--calibration", calibration_path, "start warm from this file of 'airworthy calibrate'");
-  auto* nested_flag = app.add_flag(
-      "--nested", nested, "start each flight warm from a calibration that all the other flights taught");
+
+  [[nodiscard]] bool is_response() const { return detector == eval::detector_names().front(); }
+};
+
+using Flights = std::vector<rt::Expected<eval::Flight>>;
+
+// Any other detector finds its calibration by its configuration.
+rt::Expected<Flights> run_configured(const Options& options) {
+  const auto detector = eval::load_detector(options.detector, options.config_path, options.overrides);
+  if (!detector) return tl::unexpected<rt::Error>{detector.error()};
+  Flights flights(options.logs.size());
+  calibrate::for_each_parallel(options.logs.size(), options.learning.jobs, [&](std::size_t i) {
+    const std::string& log = options.logs[i];
+    flights[i] = eval::run_flight(log, detector->process, detector->make);
+    if (flights[i] && flights[i]->vehicle != detector->vehicle) {
+      flights[i] = rt::fail_with(fmt::format("{}: of vehicle \"{}\", but {} is of \"{}\"", log,
+                                             flights[i]->vehicle, options.config_path, detector->vehicle));
+    }
+  });
+  return flights;
+}
+
+rt::Expected<Flights> run_response(const Options& options, const calibrate::FlightName& flight_name) {
+  const bool own_calibration = options.nested || !options.calibration_path.empty();
+  auto config = own_calibration ? response::ResponseConfig::load_cold(options.config_path, options.overrides)
+                                : response::ResponseConfig::load(options.config_path, options.overrides);
+  if (!config) return tl::unexpected<rt::Error>{config.error()};
+  std::optional<response::Calibration> calibration;
+  if (!options.calibration_path.empty()) {
+    auto loaded = response::load_calibration(options.calibration_path);
+    if (!loaded) return tl::unexpected<rt::Error>{loaded.error()};
+    auto monitor = response::with_calibration(config->monitor, config->channel_names(), *loaded);
+    if (!monitor) return rt::fail_with(options.calibration_path + ": " + monitor.error().text);
+    config->monitor = *monitor;
+    calibration = std::move(*loaded);
+  }
+  return options.nested ? eval::run_nested(options.logs, *config, flight_name, options.learning)
+                        : run_all(options.logs, *config, calibration, options.learning.jobs);
+}
+
+int evaluate(const Options& options) {
+  const auto flight_name = calibrate::FlightName::parse(options.flight_name_pattern);
+  if (!flight_name) return rt::fail(EX_USAGE, flight_name.error());
+  if (!options.is_response() && (options.nested || !options.calibration_path.empty())) {
+    return rt::fail(EX_USAGE,
+                    rt::Error{"airworthy-eval: --nested and --calibration are for --detector response; "
+                              "other detectors find their calibration by their configuration"});
+  }
+  auto flights = options.is_response() ? run_response(options, *flight_name) : run_configured(options);
+  if (!flights) return rt::fail(EX_CONFIG, flights.error());
+  // Only the response detector needs time to learn the flight.
+  eval::Rules rules;
+  if (!options.is_response()) rules.warm_up = Duration{0};
+  eval::Rules tolerant = rules;
+  tolerant.onset_tolerance = Duration{500'000};
+  eval::Evaluation evaluation;
+  int failures = 0;
+  for (auto& flight : *flights) {
+    if (!flight) {
+      failures = rt::fail(EX_DATAERR, flight.error());
+      continue;
+    }
+    evaluation.scores.push_back(eval::score(*flight, rules));
+    evaluation.tolerant_scores.push_back(eval::score(*flight, tolerant));
+    evaluation.flights.push_back(std::move(*flight));
+  }
+  fmt::print("{}", options.json ? eval::to_json(evaluation) : eval::to_table(evaluation));
+  return failures;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{
+      "Runs a configured detector over recorded flights, on message time, and scores it against the truth in "
+      "the logs.",
+      "airworthy eval"};
+  Options options;
+  options.learning.jobs = std::max(1U, std::thread::hardware_concurrency());
+  app.add_option("LOG", options.logs, "LCM logs, for example from 'airworthy import' or 'airworthy sim'")
+      ->required();
+  app.add_option("--detector", options.detector, "which one the configuration is of; default response")
+      ->check(CLI::IsMember(eval::detector_names()));
+  app.add_option("--config", options.config_path, "configuration of the detector")->required();
+  app.add_option("--set", options.overrides, "override of a key, as KEY=VALUE; repeatable")
+      ->allow_extra_args(false);
+  auto* calibration_option = app.add_option("--calibration", options.calibration_path,
+                                            "start warm from this file of 'airworthy calibrate'");
+  auto* nested_flag =
+      app.add_flag("--nested", options.nested,
+                   "start each flight warm from a calibration that all the other flights taught");
   nested_flag->excludes(calibration_option);
   app.add_option(
-         "--flight-name", flight_name_pattern,
+         "--flight-name", options.flight_name_pattern,
          "--nested: regular expression whose first group, in a log's name, says which flight it is a part of")
       ->needs(nested_flag);
-  app.add_option("--false-alarms-per-hour", learning.false_alarms_per_hour,
+  app.add_option("--false-alarms-per-hour", options.learning.false_alarms_per_hour,
                  "--nested: of each channel; default 0.01")
       ->check(CLI::Range(1e-6, 10.0))
       ->needs(nested_flag);
-  app.add_flag("--json", json, "print JSON instead of a table");
-  app.add_option("--jobs", learning.jobs, "flights evaluated at a time")->check(CLI::Range(1U, 256U));
+  app.add_flag("--json", options.json, "print JSON instead of a table");
+  app.add_option("--jobs", options.learning.jobs, "flights evaluated at a time")->check(CLI::Range(1U, 256U));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? EX_OK : EX_USAGE;
   }
-  const auto flight_name = calibrate::FlightName::parse(flight_name_pattern);
-  if (!flight_name) return rt::fail(EX_USAGE, flight_name.error());
-  const bool own_calibration = nested || !calibration_path.empty();
-  auto config = own_calibration ? response::ResponseConfig::load_cold(config_path, overrides)
-                                : response::ResponseConfig::load(config_path, overrides);
-  if (!config) return rt::fail(EX_CONFIG, config.error());
-  std::optional<response::Calibration> calibration;
-  if (!calibration_path.empty()) {
-    auto loaded = response::load_calibration(calibration_path);
-    if (!loaded) return rt::fail(EX_CONFIG, loaded.error());
-    auto monitor = response::with_calibration(config->monitor, config->channel_names(), *loaded);
-    if (!monitor) return rt::fail(EX_CONFIG, rt::Error{calibration_path + ": " + monitor.error().text});
-    config->monitor = *monitor;
-    calibration = std::move(*loaded);
-  }
-
-  eval::Evaluation evaluation;
-  int failures = 0;
-  for (auto& flight : nested ? eval::run_nested(logs, *config, *flight_name, learning)
-                             : run_all(logs, *config, calibration, learning.jobs)) {
-    if (!flight) {
-      failures = rt::fail(EX_DATAERR, flight.error());
-      continue;
-    }
-    evaluation.scores.push_back(eval::score(*flight, {}));
-    evaluation.tolerant_scores.push_back(eval::score(*flight, {.onset_tolerance = Duration{500'000}}));
-    evaluation.flights.push_back(std::move(*flight));
-  }
-  fmt::print("{}", json ? eval::to_json(evaluation) : eval::to_table(evaluation));
-  return failures;
+  return evaluate(options);
 }
 
 }  // namespace

@@ -42,6 +42,28 @@ volatile sig_atomic_t stop_requested = 0;
 
 void request_stop(int) { stop_requested = 1; }
 
+/// CLI::Range lets NaN through.
+CLI::Validator is_within(double least, double most) {
+  return CLI::Validator{[=](const std::string& text) -> std::string {
+                          double value = 0.0;
+                          if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) {
+                            return {};
+                          }
+                          return fmt::format("must lie in [{:g}, {:g}], is {}", least, most, text);
+                        },
+                        "NUMBER"};
+}
+
+/// A fault that the flight never reaches is told in the log's truth all the same: better ask.
+void warn_of_late_faults(const sim_command::Flight& flight) {
+  for (const sim::Fault& fault : flight.scenario.faults) {
+    if (fault.onset_s < flight.duration_s) continue;
+    fmt::print(stderr,
+               "airworthy-sim: warning: {} of {} at {:g} s never happens: the flight ends at {:g} s\n",
+               sim::word_of(fault.kind), fault.component(), fault.onset_s, flight.duration_s);
+  }
+}
+
 /// One line on stderr, where that is a terminal.
 sim_command::Progress progress_bar(double duration_s) {
   using Clock = std::chrono::steady_clock;
@@ -103,7 +125,7 @@ int run_recorded(const Options& options, const sim_command::Flight& flight) {
   const auto recording = sim_command::record(flight, options.log, progress_bar(flight.duration_s));
   if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\x1b[K");
   if (!recording) return rt::fail(EX_CANTCREAT, recording.error());
-  if (recording->stopped) return rt::fail(EX_TEMPFAIL, rt::Error{"airworthy-sim: stopped, no log written"});
+  if (recording->stopped) return rt::fail(EX_TEMPFAIL, rt::Error{"stopped, no log written"});
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   const auto bytes = static_cast<double>(std::filesystem::file_size(options.log));
   if (options.json) {
@@ -132,15 +154,16 @@ int run(int argc, char** argv) {
   app.add_option("--level", options.level, "realism: nominal, hard or brutal; default hard")
       ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Level>{
           {"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}}));
-  app.add_option("--seed", options.seed, "of all random numbers; default 1");
+  app.add_option("--seed", options.seed, "of all random numbers; default 1")->check(CLI::NonNegativeNumber);
   app.add_option(
-      "--vehicle-seed", options.vehicle_seed,
-      "of what makes this vehicle differ from its file, to fly the same one again; default: --seed");
+         "--vehicle-seed", options.vehicle_seed,
+         "of what makes this vehicle differ from its file, to fly the same one again; default: --seed")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--duration", options.duration_s, "seconds; default: the flight plan's")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(is_within(0.01, 1e6));
   app.add_option("--imu-average", options.imu_average_ms,
                  "inertial samples are averages over so many ms instead of raw ones; 5 = as PX4 streams them")
-      ->check(CLI::Range(0.5, 100.0));
+      ->check(is_within(0.5, 100.0));
   auto* log = app.add_option("-o,--output", options.log, "LCM log to write, as fast as the computer can");
   auto* live =
       app.add_option("--live", options.live,
@@ -150,17 +173,18 @@ int run(int argc, char** argv) {
   app.add_flag("--json", options.json, "print the summary as one line of JSON");
   app.add_option("--speed", options.speed, "--live: times the pace of the clock")
       ->needs(live)
-      ->check(CLI::Range(0.01, 100.0));
+      ->check(is_within(0.01, 100.0));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? EX_OK : EX_USAGE;
   }
   if (options.log.empty() && options.live.empty()) {
-    return rt::fail(EX_USAGE, rt::Error{"airworthy-sim: --output LOG or --live LINK is needed"});
+    return rt::fail(EX_USAGE, rt::Error{"--output LOG or --live LINK is needed"});
   }
   const auto flight = read_flight(options);
   if (!flight) return rt::fail(EX_CONFIG, flight.error());
+  warn_of_late_faults(*flight);
   signal(SIGINT, request_stop);
   signal(SIGTERM, request_stop);
   return options.live.empty() ? run_recorded(options, *flight) : run_live(options, *flight);

@@ -20,6 +20,7 @@ rt::Expected<Recording> record(const Flight& flight, const std::filesystem::path
   sim::Simulation simulation{*flight.vehicle.multirotor, flight.scenario, flight.realism, flight.seeds};
   for (std::int64_t step = 0; simulation.time_s() < flight.duration_s; ++step) {
     simulation.step(output);
+    if ((*writer)->failure()) break;  // a full disk will not become emptier; commit() says what it was
     if (step % kStepsPerReport == 0 && !progress(simulation.time_s())) return Recording{{}, true};
   }
   if (const auto committed = (*writer)->commit(); !committed)

@@ -15,7 +15,8 @@ namespace airworthy::rt {
 /// which its header says it was sent, so that the same messages give the same bytes.
 ///
 /// The log is written beside its target as `<target>.partial` and takes the target's name on commit().
-/// Without a commit, or after a failure, nothing is left and an older target is as before.
+/// Without a commit, or after a failure, nothing is left and an older target is as before. A target that exists
+/// must be a regular file.
 class LogWriter final : public Bus {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<LogWriter>> create(const std::string& path);
@@ -30,6 +31,9 @@ class LogWriter final : public Bus {
 
   /// Writes everything to the disk and gives the log its name. To be called once, last.
   [[nodiscard]] Expected<void> commit();
+
+  /// Why commit() will fail, once it is known.
+  [[nodiscard]] const std::optional<Error>& failure() const { return first_failure_; }
 
   /// Messages written so far, by channel.
   [[nodiscard]] const std::map<std::string, std::int64_t>& messages() const { return messages_; }

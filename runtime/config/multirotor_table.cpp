@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
+#include <vector>
 
 namespace airworthy::rt {
 namespace {
@@ -28,6 +31,34 @@ Rotor read_rotor(ConfigTable table) {
     if (rotor.thrust_axis[2] > -0.5) table.fail("thrust_axis", "must point upward, within 60 degrees of -z");
   }
   return rotor;
+}
+
+/// Two rotors in one place are a slip of the pen; without rotors all around nothing holds the vehicle level.
+void check_places(ConfigTable table, const Multirotor& vehicle) {
+  constexpr double kLeastDistance_m = 1e-3;
+  constexpr double kCentral_m = 1e-3;
+  const auto rotors = vehicle.rotors();
+  std::vector<double> azimuths_rad;
+  for (std::size_t i = 0; i < rotors.size(); ++i) {
+    const auto& hub = rotors[i].position_m;
+    for (std::size_t k = 0; k < i; ++k) {
+      const auto& other = rotors[k].position_m;
+      if (std::hypot(hub[0] - other[0], hub[1] - other[1], hub[2] - other[2]) < kLeastDistance_m) {
+        table.fail(fmt::format("rotor[{}].position_m", i), fmt::format("is that of rotor[{}]", k));
+      }
+    }
+    if (std::hypot(hub[0], hub[1]) > kCentral_m) azimuths_rad.push_back(std::atan2(hub[1], hub[0]));
+  }
+  std::sort(azimuths_rad.begin(), azimuths_rad.end());
+  double widest_rad = azimuths_rad.empty() ? 2.0 * std::numbers::pi : 0.0;
+  for (std::size_t i = 0; i < azimuths_rad.size(); ++i) {
+    const bool is_last = i + 1 == azimuths_rad.size();
+    const double next_rad = is_last ? azimuths_rad.front() + 2.0 * std::numbers::pi : azimuths_rad[i + 1];
+    widest_rad = std::max(widest_rad, next_rad - azimuths_rad[i]);
+  }
+  if (widest_rad > std::numbers::pi - 1e-3) {
+    table.fail("rotor", "the centre of mass must lie between the hubs, or nothing holds the vehicle level");
+  }
 }
 
 }  // namespace
@@ -61,9 +92,10 @@ Multirotor read_multirotor(ConfigTable table) {
   vehicle.gear_radius_m = table.required<double>("gear_radius_m", Range{1e-3, 10.0});
   const auto rotors = table.tables("rotor", {.count = Count{kMinRotors, kMaxRotors}});
   for (const ConfigTable& rotor : rotors) {
-    if (vehicle.rotor_count == kMaxRotors) break;  // reported by tables()
-    vehicle.rotor[vehicle.rotor_count++] = read_rotor(rotor);
+    const Rotor read = read_rotor(rotor);  // those beyond the limit too, or their keys would count as unknown
+    if (vehicle.rotor_count < kMaxRotors) vehicle.rotor[vehicle.rotor_count++] = read;
   }
+  check_places(table, vehicle);
   constexpr double kGravity_m_s2 = 9.81;
   const double most_thrust_N = static_cast<double>(vehicle.rotor_count) * vehicle.thrust_coefficient_N_s2 *
                                vehicle.speed_max_rad_s * vehicle.speed_max_rad_s;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <numeric>
+#include <optional>
 #include <string_view>
 
 #include "runtime/config/config_file.h"
@@ -11,7 +12,7 @@
 namespace airworthy::sim {
 namespace {
 
-enum class Subject { kRotor, kSensor, kLink };
+enum class Subject { kRotor, kSensorAxis, kSensor, kLink };
 
 /// How a kind of fault is written: its word, what it is about, and the key of its magnitude, if it has one.
 struct FaultWord {
@@ -25,6 +26,7 @@ struct FaultWord {
 
 constexpr rt::Range kAny{-1e6, 1e6};
 constexpr rt::Range kShare{0.0, 1.0};
+// In the order of FaultKind.
 constexpr std::array kFaults{
     FaultWord{FaultKind::kUnbalance, "unbalance", Subject::kRotor, "tip_mass_mg", rt::Range{0.0, 1e5},
               "growth_mg_per_s"},
@@ -38,43 +40,50 @@ constexpr std::array kFaults{
     FaultWord{FaultKind::kTelemetryWrongUnit, "telemetry_wrong_unit", Subject::kRotor, "pole_pairs",
               rt::Range{2.0, 20.0}, ""},
     FaultWord{FaultKind::kLinkLoss, "link_loss", Subject::kLink, "", kAny, ""},
-    FaultWord{FaultKind::kGyroBias, "gyro_bias", Subject::kSensor, "bias_rad_s", kAny, ""},
-    FaultWord{FaultKind::kGyroDrift, "gyro_drift", Subject::kSensor, "", kAny, "drift_rad_s2"},
-    FaultWord{FaultKind::kGyroSpike, "gyro_spike", Subject::kSensor, "spike_rad_s", kAny, ""},
+    FaultWord{FaultKind::kGyroBias, "gyro_bias", Subject::kSensorAxis, "bias_rad_s", kAny, ""},
+    FaultWord{FaultKind::kGyroDrift, "gyro_drift", Subject::kSensorAxis, "", kAny, "drift_rad_s2"},
+    FaultWord{FaultKind::kGyroSpike, "gyro_spike", Subject::kSensorAxis, "spike_rad_s", kAny, ""},
     FaultWord{FaultKind::kGyroFreeze, "gyro_freeze", Subject::kSensor, "", kAny, ""},
-    FaultWord{FaultKind::kAccelBias, "accel_bias", Subject::kSensor, "bias_m_s2", kAny, ""},
-    FaultWord{FaultKind::kAccelDrift, "accel_drift", Subject::kSensor, "", kAny, "drift_m_s3"},
-    FaultWord{FaultKind::kAccelSpike, "accel_spike", Subject::kSensor, "spike_m_s2", kAny, ""},
+    FaultWord{FaultKind::kAccelBias, "accel_bias", Subject::kSensorAxis, "bias_m_s2", kAny, ""},
+    FaultWord{FaultKind::kAccelDrift, "accel_drift", Subject::kSensorAxis, "", kAny, "drift_m_s3"},
+    FaultWord{FaultKind::kAccelSpike, "accel_spike", Subject::kSensorAxis, "spike_m_s2", kAny, ""},
     FaultWord{FaultKind::kAccelFreeze, "accel_freeze", Subject::kSensor, "", kAny, ""},
 };
 
 const FaultWord& entry_of(FaultKind kind) { return kFaults[static_cast<std::size_t>(kind)]; }
 
-FaultKind read_kind(rt::ConfigTable table) {
-  // choice() wants a list at hand; the order is that of kFaults.
-  return table.choice<FaultKind>("kind", {{kFaults[0].word, kFaults[0].kind},
-                                          {kFaults[1].word, kFaults[1].kind},
-                                          {kFaults[2].word, kFaults[2].kind},
-                                          {kFaults[3].word, kFaults[3].kind},
-                                          {kFaults[4].word, kFaults[4].kind},
-                                          {kFaults[5].word, kFaults[5].kind},
-                                          {kFaults[6].word, kFaults[6].kind},
-                                          {kFaults[7].word, kFaults[7].kind},
-                                          {kFaults[8].word, kFaults[8].kind},
-                                          {kFaults[9].word, kFaults[9].kind},
-                                          {kFaults[10].word, kFaults[10].kind},
-                                          {kFaults[11].word, kFaults[11].kind},
-                                          {kFaults[12].word, kFaults[12].kind},
-                                          {kFaults[13].word, kFaults[13].kind},
-                                          {kFaults[14].word, kFaults[14].kind},
-                                          {kFaults[15].word, kFaults[15].kind},
-                                          {kFaults[16].word, kFaults[16].kind}});
+std::optional<FaultKind> read_kind(rt::ConfigTable table) {
+  const auto word = table.required<std::string>("kind");
+  std::string words;
+  for (const FaultWord& entry : kFaults) {
+    if (entry.word == word) return entry.kind;
+    words += fmt::format("{}{}", words.empty() ? "" : ", ", entry.word);
+  }
+  table.fail("kind", fmt::format("must be one of {}, is \"{}\"", words, word));
+  return std::nullopt;
 }
-static_assert(kFaults.size() == 17);
+
+// What an unknown kind may be written with is not known: none of it is worth a complaint.
+void pass_over(rt::ConfigTable table) {
+  for (const std::string_view key : {"onset_s", "end_s", "rotor"}) {
+    static_cast<void>(table.if_present<double>(key));
+  }
+  for (const std::string_view key : {"axis", "link"}) static_cast<void>(table.if_present<std::string>(key));
+  for (const FaultWord& entry : kFaults) {
+    for (const std::string_view key : {entry.magnitude_key, entry.growth_key}) {
+      if (!key.empty()) static_cast<void>(table.if_present<double>(key));
+    }
+  }
+}
 
 Fault read_fault(rt::ConfigTable table, std::size_t rotor_count) {
   Fault fault;
-  fault.kind = read_kind(table);
+  const auto kind = read_kind(table);
+  if (!kind) {
+    pass_over(table);
+    return fault;
+  }
+  fault.kind = *kind;
   const FaultWord& entry = entry_of(fault.kind);
   fault.onset_s = table.required<double>("onset_s", rt::Range{0.0, 1e6});
   if (const auto end = table.if_present<double>("end_s", rt::Range{0.0, 1e6})) {
@@ -89,8 +98,10 @@ Fault read_fault(rt::ConfigTable table, std::size_t rotor_count) {
       fault.rotor = static_cast<std::size_t>(
           table.required<int>("rotor", rt::Range{1.0, static_cast<double>(rotor_count)}));
       break;
-    case Subject::kSensor:
+    case Subject::kSensorAxis:
       fault.axis = table.choice<int>("axis", {{"x", 0}, {"y", 1}, {"z", 2}});
+      break;
+    case Subject::kSensor:
       break;
     case Subject::kLink:
       fault.link = table.choice<Link>("link", {{"esc", Link::kEsc}, {"autopilot", Link::kAutopilot}});
@@ -162,6 +173,8 @@ void check_order(rt::ConfigTable root, const Scenario& scenario) {
 }  // namespace
 
 std::string_view word_of(FaultKind kind) { return entry_of(kind).word; }
+
+bool has_magnitude(FaultKind kind) { return !entry_of(kind).magnitude_key.empty(); }
 
 std::string Fault::component() const {
   if (rotor > 0) return fmt::format("rotor {}", rotor);

@@ -45,6 +45,8 @@ enum class FaultKind {
 
 /// The word of a kind in scenario files and in GROUND_TRUTH.
 [[nodiscard]] std::string_view word_of(FaultKind kind);
+/// Whether a kind has a magnitude at its onset.
+[[nodiscard]] bool has_magnitude(FaultKind kind);
 
 enum class Link { kNone, kEsc, kAutopilot };
 
@@ -54,7 +56,7 @@ struct Fault {
   double onset_s = 0.0;
   double end_s = std::numeric_limits<double>::infinity();
   std::size_t rotor = 0;   ///< 1-based; 0 = not a fault of a rotor
-  int axis = 0;            ///< of a sensor: 0 x, 1 y, 2 z
+  int axis = 0;            ///< of a sensor: 0 x, 1 y, 2 z; a frozen one is so in all
   double magnitude = 0.0;  ///< in the unit of its kind
   double growth_per_s = 0.0;
   Link link = Link::kNone;

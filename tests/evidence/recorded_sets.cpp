@@ -15,7 +15,7 @@ RecordedSet bebop_set(const std::filesystem::path& data) {
   std::erase_if(flight.rows, [start = flight.rows.empty() ? TimePoint{} : flight.rows.front().time](
                                  const auto& row) { return to_seconds(row.time - start) > kBebopTo_s; });
   if (!flight.rows.empty()) set.flights.push_back(std::move(flight));
-  set.params.vehicle = bebop();
+  set.params.vehicle = vehicle_called("bebop2");
   set.params.most_speed_error_ratio = 0.01;
   // Its vibration turns against the rotor as much as with it.
   set.params.against_ratio = 1.0;
@@ -28,7 +28,7 @@ RecordedSet thrown_set(const std::filesystem::path& data) {
                   .pole_Hz = 40.0,
                   .resolution_m_s2 = 9.80665 / 2048.0};
   set.flights = load_all(data / set.name, load_thrown);
-  set.params.vehicle = thrown_quad();
+  set.params.vehicle = vehicle_called("indiflight_throw");
   // Accelerations as the sensor's low-pass leaves them, some 2 to 4 % at 317 Hz.
   set.params.smallest_m_s2 = 0.02;
   set.params.caution_m_s2 = 0.06;
@@ -40,7 +40,7 @@ RecordedSet thrown_set(const std::filesystem::path& data) {
 RecordedSet crazyflie_set(const std::filesystem::path& data) {
   RecordedSet set{.name = "crazyflie_brushless_rpm"};
   set.flights = load_all(data / set.name, load_crazyflie);
-  set.params.vehicle = crazyflie_brushless();
+  set.params.vehicle = vehicle_called("crazyflie_brushless");
   set.params.low_pass_Hz = 30.0;  // of the firmware's accelerometer filter
   set.params.most_speed_error_ratio = 0.005;
   return set;

@@ -1,6 +1,7 @@
 #include "runtime/bus/log_writer.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 
@@ -124,6 +125,14 @@ TEST_F(LogWriterTest, AFullDiskIsAnError) {
   EXPECT_EQ(committed.error().text, path_ + ": No space left on device");
   writer->reset();
   EXPECT_TRUE(files().empty());
+}
+
+TEST_F(LogWriterTest, NothingButAFileIsReplaced) {
+  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+  EXPECT_EQ(LogWriter::create(path_).error().text, path_ + ": exists and is not a regular file");
+  EXPECT_TRUE(std::filesystem::is_fifo(path_));
+  const std::string folder = folder_.path().string();
+  EXPECT_EQ(LogWriter::create(folder).error().text, folder + ": exists and is not a regular file");
 }
 
 TEST_F(LogWriterTest, AFolderThatDoesNotExistIsAnError) {

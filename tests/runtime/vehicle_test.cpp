@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
 #include "tests/runtime/config_support.h"
 #include "tests/runtime/temporary_folder.h"
 
@@ -86,6 +89,61 @@ TEST(Vehicle, ShippedFileIsValid) {
       VehicleFile::load(std::filesystem::path{AIRWORTHY_SOURCE_DIR} / "config" / "vehicle.toml");
   ASSERT_TRUE(vehicle.has_value()) << vehicle.error().text;
   EXPECT_TRUE(VehicleFile::is_valid_name(vehicle->name));
+}
+
+/// A multirotor with these hubs; the first line of a rotor is 16, then every third.
+std::string multirotor_with(const std::vector<std::string>& positions, const std::string& mass = "1.0") {
+  std::string text = "name = \"v\"\nkind = \"multirotor\"\n[multirotor]\nmass_kg = " + mass +
+                     "\ninertia_kg_m2 = [0.01, 0.01, 0.02]\nthrust_coefficient_N_s2 = 1e-5\n"
+                     "torque_ratio_m = 0.01\npropeller_radius_m = 0.1\npropeller_inertia_kg_m2 = 1e-5\n"
+                     "motor_time_constant_s = 0.03\nspeed_min_rad_s = 100\nspeed_max_rad_s = 900\n"
+                     "gear_height_m = 0.1\ngear_radius_m = 0.1\n";
+  for (const std::string& position : positions) {
+    text += "[[multirotor.rotor]]\nposition_m = " + position + "\nspin = \"clockwise\"\n";
+  }
+  return text;
+}
+
+const std::vector<std::string> kSquare{"[0.2, 0.2, 0.0]", "[-0.2, 0.2, 0.0]", "[-0.2, -0.2, 0.0]",
+                                       "[0.2, -0.2, 0.0]"};
+
+TEST(MultirotorTable, TakesThreeToEightRotorsEachInItsPlace) {
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare)), "");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with({"[0.2, 0.0, 0.0]", "[-0.1, 0.2, 0.0]", "[-0.1, -0.2, 0.0]"})),
+            "");
+  auto coaxial = kSquare;
+  for (const std::string& hub : kSquare) coaxial.push_back(hub.substr(0, hub.size() - 4) + "0.05]");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(coaxial)), "");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with({})),
+            "v.toml:3:1: multirotor.rotor: missing mandatory tables, must have 3 to 8 elements");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with({kSquare[0], kSquare[2]})),
+            "v.toml:15:14: multirotor.rotor: must have 3 to 8 elements, has 2");
+  coaxial.emplace_back("[0.3, 0.0, 0.0]");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(coaxial)),
+            "v.toml:15:14: multirotor.rotor: must have 3 to 8 elements, has 9");
+}
+
+TEST(MultirotorTable, RefusesWhatCannotFly) {
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "-1.0")),
+            "v.toml:4:1: multirotor.mass_kg: must lie in [0.001, 1000], is -1");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "nan")),
+            "v.toml:4:1: multirotor.mass_kg: must be finite, is nan");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "4.0")),
+            "v.toml:12:1: multirotor.speed_max_rad_s: all rotors at full speed lift 32.4 N, less than the "
+            "weight of 39.2 N");
+  auto twice = kSquare;
+  twice.push_back(kSquare[1]);
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(twice)),
+            "v.toml:28:1: multirotor.rotor[4].position_m: is that of rotor[1]");
+  const std::string unbalanced =
+      "v.toml:15:14: multirotor.rotor: the centre of mass must lie between the hubs, or nothing holds the "
+      "vehicle level";
+  EXPECT_EQ(errors_of_vehicle(multirotor_with({"[0.2, 0.0, 0.0]", "[0.0, 0.0, 0.0]", "[-0.2, 0.0, 0.0]"})),
+            unbalanced)
+      << "all on a line";
+  EXPECT_EQ(errors_of_vehicle(multirotor_with({"[0.2, 0.2, 0.0]", "[0.2, -0.2, 0.0]", "[0.1, 0.0, 0.0]"})),
+            unbalanced)
+      << "all in front";
 }
 
 }  // namespace

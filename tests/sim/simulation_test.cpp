@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <fstream>
 #include <iterator>
+#include <numbers>
+#include <set>
 
 #include "runtime/bus/log_writer.h"
 #include "sim/output/log_output.h"
@@ -162,6 +165,8 @@ TEST(Simulation, TellsTheTruthOnce) {
   EXPECT_EQ(faulty.truths[1].component, "rotor 3");
   EXPECT_EQ(faulty.truths[1].fault_kind, "dead_esc");
   EXPECT_EQ(faulty.truths[1].onset_s, 8.0);
+  EXPECT_EQ(faulty.truths[0].magnitude, 0.2);
+  EXPECT_TRUE(std::isnan(faulty.truths[1].magnitude)) << "a dead ESC has none";
 }
 
 /// Flies the octocopter, which survives any one rotor, with one fault from 8 s on.
@@ -297,6 +302,98 @@ TEST(Faults, SensorsShiftDriftSpikeAndFreeze) {
         gyro_frozen.imu[k].gyro_rad_s == gyro_frozen.imu[k - 1].gyro_rad_s && gyro_frozen.imu[k].time_s > 8.0;
   }
   EXPECT_NEAR(repeats, 50, 2);
+}
+
+/// Root mean square of the horizontal acceleration that turns with the measured speed of a rotor, from two
+/// quadratures over whole windows: the amplitude of a line buried in everything else.
+double line_m_s2(const Recorder& recorder, std::size_t rotor, double from_s, double until_s) {
+  const double speed_rad_s = mean_speed_rpm(recorder, rotor, from_s, until_s) * std::numbers::pi / 30.0;
+  double most = 0.0;
+  // The mean speed is not exact, and the line wanders: the strongest of its neighbourhood.
+  for (int step = -60; step <= 60; ++step) {
+    const double detune = 0.0005 * step;
+    Eigen::Vector2cd sum = Eigen::Vector2cd::Zero();
+    int count = 0;
+    for (const ImuSample& sample : recorder.imu) {
+      if (sample.time_s < from_s || sample.time_s >= until_s) continue;
+      sum += std::polar(1.0, -speed_rad_s * (1.0 + detune) * sample.time_s) * sample.accel_m_s2.head<2>();
+      ++count;
+    }
+    most = std::max(most, std::sqrt(2.0) * sum.norm() / count);
+  }
+  return most;
+}
+
+TEST(Faults, UnbalanceStepsAndGrowsAtTheSpeedOfItsRotor) {
+  const auto fly_perfect = [](const Fault& fault) {
+    Scenario scenario = hover_plan(20.0);
+    scenario.faults = {fault};
+    Multirotor vehicle = vehicle_named("unbalance_medium");
+    Realism still = Realism::at(Level::kNominal);
+    still.rotor.natural_unbalance_m_s2 = 0.0;
+    still.motor.speed_error_ratio = 0.0;
+    still.airframe = {};
+    still.wind.mean_m_s = 0.0;
+    still.autopilot.attitude_noise_rad = still.autopilot.position_noise_m = 0.0;
+    still.autopilot.velocity_noise_m_s = 0.0;
+    Simulation simulation{vehicle, scenario, still, 9};
+    Recorder recorder;
+    fly(simulation, recorder, 14.0);
+    return recorder;
+  };
+  // Closed form: m·r·ω² over the mass of the vehicle, through the anti-alias filter of second order.
+  const Multirotor vehicle = vehicle_named("unbalance_medium");
+  const auto expected = [&vehicle](const Recorder& recorder, double mass_mg, double from_s) {
+    const double omega = mean_speed_rpm(recorder, 1, from_s, from_s + 0.5) * std::numbers::pi / 30.0;
+    const double cutoff = Realism::at(Level::kNominal).imu.filter_cutoff_Hz * 2.0 * std::numbers::pi;
+    return 1e-6 * mass_mg * vehicle.propeller_radius_m * omega * omega / vehicle.mass_kg /
+           std::sqrt(1.0 + std::pow(omega / cutoff, 4.0));
+  };
+  const Recorder step =
+      fly_perfect({.kind = FaultKind::kUnbalance, .onset_s = 10.0, .rotor = 2, .magnitude = 100.0});
+  EXPECT_LT(line_m_s2(step, 1, 9.0, 9.5), 0.2 * expected(step, 100.0, 9.0));
+  EXPECT_NEAR(line_m_s2(step, 1, 10.5, 11.0) / expected(step, 100.0, 10.5), 1.0, 0.15);
+  const Recorder growth =
+      fly_perfect({.kind = FaultKind::kUnbalance, .onset_s = 10.0, .rotor = 2, .growth_per_s = 50.0});
+  EXPECT_NEAR(line_m_s2(growth, 1, 11.75, 12.25) / expected(growth, 100.0, 11.75), 1.0, 0.2);
+  EXPECT_NEAR(line_m_s2(growth, 1, 13.25, 13.75) / expected(growth, 175.0, 13.25), 1.0, 0.2);
+}
+
+TEST(Faults, TelemetryFreezesAndShowsTheWrongUnit) {
+  const Recorder frozen = fly_with({.kind = FaultKind::kTelemetryFrozen, .onset_s = 8.0, .rotor = 2});
+  std::set<double> before;
+  std::set<double> after;
+  for (const EscSample& sample : frozen.esc) {
+    if (sample.time_s > 7.0 && sample.time_s < 8.0) before.insert(sample.speed_rpm[1]);
+    if (sample.time_s > 8.1 && !std::isnan(sample.speed_rpm[1])) after.insert(sample.speed_rpm[1]);
+  }
+  EXPECT_GT(before.size(), 5U);
+  EXPECT_EQ(after.size(), 1U);
+  const Recorder wrong =
+      fly_with({.kind = FaultKind::kTelemetryWrongUnit, .onset_s = 8.0, .rotor = 2, .magnitude = 7.0});
+  EXPECT_NEAR(mean_speed_rpm(wrong, 1, 8.1, 11.0) / mean_speed_rpm(wrong, 1, 7.0, 8.0), 7.0, 0.1);
+  EXPECT_NEAR(wrong.esc.back().temperature_degC[1] - wrong.esc.back().temperature_degC[0], 273.15, 1e-9);
+  EXPECT_NEAR(mean_speed_rpm(wrong, 0, 8.1, 11.0) / mean_speed_rpm(wrong, 0, 7.0, 8.0), 1.0, 0.02);
+}
+
+TEST(Faults, AGyroscopeDriftsWhileTheRateLoopFollowsIt) {
+  const Recorder flown =
+      fly_with({.kind = FaultKind::kGyroDrift, .onset_s = 8.0, .axis = 2, .growth_per_s = 0.02}, 18.0);
+  // The autopilot holds what it reads near zero, so the vehicle itself turns back as fast as the bias grows:
+  // the heading error that the attitude loop sees balances gain · error = bias.
+  const auto heading = [&flown](double time_s) {
+    for (const AutopilotSample& sample : flown.attitude) {
+      if (sample.time_s >= time_s) {
+        return std::atan2(2.0 * sample.estimate.q_NB.w() * sample.estimate.q_NB.z(),
+                          1.0 - 2.0 * std::pow(sample.estimate.q_NB.z(), 2.0));
+      }
+    }
+    return 0.0;
+  };
+  const double first = heading(13.0) - heading(8.0);
+  const double second = heading(17.9) - heading(8.0);
+  EXPECT_LT(first, -0.005);
+  EXPECT_LT(second, 1.5 * first) << "grows on";
 }
 
 }  // namespace

@@ -11,7 +11,8 @@
 namespace airworthy::sim {
 
 inline constexpr std::array kVehicles{
-    "unbalance_small", "unbalance_medium", "unbalance_hexa", "bebop2", "f450", "octo"};
+    "unbalance_small",  "unbalance_medium",   "unbalance_hexa", "bebop2", "f450", "octo",
+    "indiflight_throw", "crazyflie_brushless"};
 
 /// A shipped vehicle, by the name of its file.
 inline Multirotor vehicle_named(const std::string& name) {

@@ -259,29 +259,10 @@ void learn_speed_errors(std::span<const UnbalanceFlight* const> flights, Unbalan
   }
 }
 
-Multirotor bebop() {
-  const auto file = rt::VehicleFile::load(std::string{AIRWORTHY_CONFIG} + "/vehicles/bebop2.toml");
+Multirotor vehicle_called(const std::string& name) {
+  const auto file = rt::VehicleFile::load(std::string{AIRWORTHY_CONFIG} + "/vehicles/" + name + ".toml");
   AW_ASSERT(file && file->multirotor);
   return *file->multirotor;
 }
-
-namespace {
-
-Multirotor quad(double mass_kg, double thrust_over_mass, std::array<int, 4> spin) {
-  Multirotor vehicle;
-  vehicle.mass_kg = mass_kg;
-  vehicle.thrust_coefficient_N_s2 = thrust_over_mass * mass_kg;
-  vehicle.speed_min_rad_s = 300.0;
-  vehicle.speed_max_rad_s = 4000.0;
-  vehicle.rotor_count = 4;
-  for (std::size_t i = 0; i < 4; ++i) vehicle.rotor[i].spin = spin[i];
-  return vehicle;
-}
-
-}  // namespace
-
-Multirotor thrown_quad() { return quad(0.4, 6.3e-7, {1, -1, -1, 1}); }
-
-Multirotor crazyflie_brushless() { return quad(0.037, 6.5e-7, {-1, 1, -1, 1}); }
 
 }  // namespace airworthy::testing

@@ -49,7 +49,7 @@ struct SpeedTelemetry {
 
 /// What an UnbalanceMonitor said of a flight.
 struct UnbalanceFlight {
-  static constexpr std::size_t kReasons = 7;
+  static constexpr std::size_t kReasons = 8;
   struct Report {
     std::size_t rotor = 0;
     double time_s = 0.0;
@@ -86,13 +86,7 @@ void learn_baseline(std::span<const std::array<double, 4>> amplitudes_m_s2, Unba
 /// The clock errors from where they ended in flights of the vehicle: the median.
 void learn_speed_errors(std::span<const UnbalanceFlight* const> flights, UnbalanceParams& params);
 
-/// The Bebop as its vehicle file has it.
-[[nodiscard]] Multirotor bebop();
-/// The thrown 3-inch quadrotors. Thrust over mass, 6.3e-7 m/s² per (rad/s)², is the fit of the recordings' README;
-/// mass and thrust coefficient count by their ratio only, so amplitudes in m/s² do not depend on the assumed mass.
-/// The senses of rotation follow from the yaw moment that accelerating rotors leave (tools/evidence).
-[[nodiscard]] Multirotor thrown_quad();
-/// Crazyflie 2.1 Brushless; thrust over mass fitted to its flights as the ratio of their means.
-[[nodiscard]] Multirotor crazyflie_brushless();
+/// A vehicle by the name of its file in config/vehicles.
+[[nodiscard]] Multirotor vehicle_called(const std::string& name);
 
 }  // namespace airworthy::testing

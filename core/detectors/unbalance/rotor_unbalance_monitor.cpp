@@ -15,10 +15,29 @@ constexpr double kConverging_s = 1.0;
 constexpr double kSmoothing_s = 0.5;
 constexpr double kSigmas = 2.0;
 constexpr double kFrozen_s = 1.0;
+constexpr double kInertialStale_s = 1.0;
 constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
 constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
 constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
+
+SignalPowerParams power_params(const UnbalanceParams& params) {
+  SignalPowerParams power;
+  power.mass_kg = params.vehicle.mass_kg / params.response;
+  power.propeller_radius_m = params.vehicle.propeller_radius_m;
+  // The paper starts from what makes about half a m/s² at hover, 20 mg on its larger vehicles.
+  power.initial_tip_mass_mg =
+      1e6 * params.usual_m_s2 * UnbalanceMonitor::kg_m_per_m_s2(params) / params.vehicle.propeller_radius_m;
+  power.sensor.filter_cutoff_Hz = params.low_pass_Hz;
+  return power;
+}
+
+template <std::size_t N>
+std::array<double, N> first(const std::array<double, kMaxRotors>& all) {
+  std::array<double, N> result{};
+  std::copy_n(all.begin(), N, result.begin());
+  return result;
+}
 
 }  // namespace
 
@@ -41,6 +60,7 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
                 .speed_noise_ratio = params.speed_noise_ratio,
                 .most_speed_error_ratio = params.most_speed_error_ratio,
                 .low_pass_Hz = params.low_pass_Hz}},
+      fallback_{params.vehicle, power_params(params), first<N>(params.baseline_power)},
       life_{[&]<std::size_t... kIndex>(std::index_sequence<kIndex...>){return std::array<FaultLifeCycle, N>{
           (static_cast<void>(kIndex), FaultLifeCycle{params.life_cycle})...};
 }  // namespace airworthy
@@ -75,23 +95,43 @@ void RotorUnbalanceMonitor<N>::on_speeds(TimePoint time, std::span<const double>
 }
 
 template <std::size_t N>
+void RotorUnbalanceMonitor<N>::on_commands(TimePoint time, std::span<const double> command_ratio) noexcept {
+  if (command_ratio.size() == N) fallback_.on_commands(time, std::span<const double, N>{command_ratio});
+}
+
+template <std::size_t N>
 bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2,
                                         double window_s) noexcept {
-  const bool flies = phase_ == Phase::kInFlight;
+  accel_at_ = time;
+  has_accel_ = true;
+  // A hard gust may look like a touch-down for a moment: what was learned before is not lost by that.
+  const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
   if (flies && !is_tracking_) {
     tracker_.forget();
     power_m2_s4_.fill(0.0);
+    against_power_m2_s4_.fill(0.0);
+    fallback_.restart();
     tracking_since_ = time;
   }
   is_tracking_ = flies;
   if (flies) {
     window_s_ = std::isfinite(window_s) ? window_s : 0.0;
+    fallback_.on_accel(time, a_x_m_s2, a_y_m_s2);
     if (tracker_.on_accel(time, a_x_m_s2, a_y_m_s2, window_s_) == UpdateStatus::kFused) {
       nis_ += 0.002 * (tracker_.innovation().nis() - nis_);
     }
   }
   if (has_judged_ && time - judged_at_ < kPeriod) return false;
   judge(time);
+  return true;
+}
+
+template <std::size_t N>
+bool RotorUnbalanceMonitor<N>::on_clock(TimePoint now) noexcept {
+  if (!has_accel_ || to_seconds(now - accel_at_) <= kInertialStale_s || now - judged_at_ < kPeriod)
+    return false;
+  is_tracking_ = false;
+  judge(now);
   return true;
 }
 
@@ -106,7 +146,8 @@ bool RotorUnbalanceMonitor<N>::speeds_carry_the_vehicle() const noexcept {
 
 template <std::size_t N>
 UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const noexcept {
-  if (!is_tracking_) return UnbalanceNotJudged::kNotFlying;
+  if (to_seconds(now - accel_at_) > kInertialStale_s) return UnbalanceNotJudged::kInertialStale;
+  if (phase_ != Phase::kInFlight) return UnbalanceNotJudged::kNotFlying;
   const bool fuses = tracker_.counters().fused > fused_at_judgement_;
   if (to_seconds(now - tracking_since_) < kConverging_s) return UnbalanceNotJudged::kConverging;
   if (!fuses) return UnbalanceNotJudged::kSpeedUnknown;
@@ -148,10 +189,15 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
   }();
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];
+    rotor.by_power = false;
     const double variance = tracker_.turning_variance_m2_s4(k);
-    const double power = tracker_.turning_m_s2(k, prior_.spin[k]).squared() - 2.0 * variance;
-    power_m2_s4_[k] += std::min(1.0, dt_s / kSmoothing_s) * (power - power_m2_s4_[k]);
-    rotor.amplitude_m_s2 = std::sqrt(std::max(0.0, power_m2_s4_[k]));
+    const auto smoothed = [&](double& power, int spin) {
+      const double seen = tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance;
+      power += std::min(1.0, dt_s / kSmoothing_s) * (seen - power);
+      return std::sqrt(std::max(0.0, power));
+    };
+    rotor.amplitude_m_s2 = smoothed(power_m2_s4_[k], prior_.spin[k]);
+    rotor.against_m_s2 = smoothed(against_power_m2_s4_[k], -prior_.spin[k]);
     rotor.sigma_m_s2 = std::sqrt(variance);
     rotor.growth_m_s2 = rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[k] : 0.0);
     rotor.growth_sigma_m_s2 = params_.has_baseline
@@ -212,6 +258,30 @@ void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_fau
 }
 
 template <std::size_t N>
+void RotorUnbalanceMonitor<N>::judge_by_power(TimePoint now, double dt_s) noexcept {
+  const double m_s2_per_kg_m = 1.0 / kg_m_per_m_s2(params_);
+  const auto verdict = fallback_.judge(dt_s);
+  for (std::size_t i = 0; i < N; ++i) {
+    RotorUnbalance& rotor = rotor_[i];
+    rotor.by_power = true;
+    rotor.reason = UnbalanceNotJudged::kJudged;
+    rotor.amplitude_m_s2 = m_s2_per_kg_m * verdict.unbalance_kg_m[i];
+    rotor.sigma_m_s2 = rotor.growth_sigma_m_s2 = m_s2_per_kg_m * verdict.sigma_kg_m[i];
+    rotor.growth_m_s2 =
+        rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[i] : params_.usual_m_s2);
+    rotor.log_odds = verdict.evidence[i];
+    const bool is_grown = verdict.named == i && rotor.growth_m_s2 > params_.smallest_m_s2;
+    grown_[i].step(is_grown, now);
+    rotor.test_ratio = is_grown || is_known_[i] ? 1.0 : 0.0;
+    if (is_grown && !is_known_[i]) rotor.onset = now;
+    rotor.transition = life_[i].step(rotor.test_ratio, now);
+    is_known_[i] = life_[i].active();
+  }
+  ambiguous_.step(false, now);
+  ambiguity_ = ambiguity_life_.active() ? ambiguity_life_.step(1.0, now) : Transition::kNone;
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::mute(UnbalanceNotJudged reason, TimePoint now) noexcept {
   for (std::size_t i = 0; i < N; ++i) {
     rotor_[i].reason = reason;
@@ -232,6 +302,13 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   has_judged_ = true;
   const UnbalanceNotJudged reason = reason_for_all(now);
   fused_at_judgement_ = tracker_.counters().fused;
+  const bool speeds_fail =
+      reason == UnbalanceNotJudged::kSpeedUnknown || reason == UnbalanceNotJudged::kSpeedImplausible;
+  if (speeds_fail && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
+    state_ = DetectorState::kMonitoring;
+    judge_by_power(now, dt_s);
+    return;
+  }
   state_ = reason == UnbalanceNotJudged::kJudged       ? DetectorState::kMonitoring
            : reason == UnbalanceNotJudged::kConverging ? DetectorState::kConverging
                                                        : DetectorState::kMuted;
@@ -257,6 +334,14 @@ UnbalanceInnovation RotorUnbalanceMonitor<N>::innovation() const noexcept {
           .samples_refused = counters.not_finite + counters.time_backward + counters.speed_unknown,
           .speeds_refused = counters.speed_refused,
           .speed_error_ratio = speed_error_ratio};
+}
+
+template <std::size_t N>
+std::array<double, kMaxRotors> RotorUnbalanceMonitor<N>::powers() const noexcept {
+  std::array<double, kMaxRotors> result{};
+  const auto powers = fallback_.powers();
+  std::copy(powers.begin(), powers.end(), result.begin());
+  return result;
 }
 
 template class RotorUnbalanceMonitor<3>;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/detectors/unbalance/power_fallback.h"
 #include "core/detectors/unbalance/rotor_hypotheses.h"
 #include "core/detectors/unbalance/unbalance_monitor.h"
 #include "core/estimators/unbalance/order_tracker.h"
@@ -14,7 +15,9 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
 
   void on_phase(Phase phase) noexcept override;
   void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept override;
+  void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept override;
   bool on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2, double window_s) noexcept override;
+  bool on_clock(TimePoint now) noexcept override;
 
   [[nodiscard]] DetectorState state() const noexcept override { return state_; }
   [[nodiscard]] TimePoint judged_at() const noexcept override { return judged_at_; }
@@ -23,6 +26,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   [[nodiscard]] std::uint32_t candidates() const noexcept override { return candidates_; }
   [[nodiscard]] TimePoint ambiguous_since() const noexcept override { return ambiguous_since_; }
   [[nodiscard]] UnbalanceInnovation innovation() const noexcept override;
+  [[nodiscard]] std::array<double, kMaxRotors> powers() const noexcept override;
 
  private:
   using Tracker = OrderTracker<double, N>;
@@ -44,6 +48,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   void estimate(double dt_s) noexcept;
   void test_rotors(TimePoint now) noexcept;
   void test_ambiguity(TimePoint now, double log_odds_faulty) noexcept;
+  void judge_by_power(TimePoint now, double dt_s) noexcept;
   void mute(UnbalanceNotJudged reason, TimePoint now) noexcept;
   [[nodiscard]] UnbalanceNotJudged reason_for_all(TimePoint now) const noexcept;
   [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor) const noexcept;
@@ -51,9 +56,11 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
 
   UnbalanceParams params_;
   Tracker tracker_;
+  PowerFallback<N> fallback_;
   UnbalancePrior<double, N> prior_;
   std::array<RotorUnbalance, N> rotor_{};
   std::array<double, N> power_m2_s4_{};  ///< smoothed |A₊|² less its variance
+  std::array<double, N> against_power_m2_s4_{};
   std::array<FaultLifeCycle, N> life_;
   std::array<Held, N> grown_{};
   std::array<bool, N> is_known_{};
@@ -66,6 +73,8 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   DetectorState state_ = DetectorState::kInitialising;
   Phase phase_ = Phase::kUnknown;
   TimePoint judged_at_{};
+  TimePoint accel_at_{};
+  bool has_accel_ = false;
   TimePoint tracking_since_{};
   bool is_tracking_ = false;
   bool has_judged_ = false;

@@ -16,12 +16,14 @@ namespace airworthy {
 /// response · m·r·ω₀² / vehicle mass of it.
 struct UnbalanceParams {
   Multirotor vehicle;
-  double smallest_m_s2 = 0.4;  ///< advisory: growth over the baseline that is reported
-  double caution_m_s2 = 1.2;   ///< growth from which the vehicle should return
-  bool has_baseline = false;   ///< calibrated; otherwise every rotor is taken to have `usual_m_s2`
-  double usual_m_s2 = 0.5;     ///< of propellers nobody has measured
+  double smallest_m_s2 = 0.4;         ///< advisory: growth over the baseline that is reported
+  double caution_m_s2 = 1.2;          ///< growth from which the vehicle should return
+  bool thresholds_are_masses = true;  ///< then they change with `response`
+  bool has_baseline = false;          ///< calibrated; otherwise every rotor is taken to have `usual_m_s2`
+  double usual_m_s2 = 0.5;            ///< of propellers nobody has measured
   std::array<double, kMaxRotors> baseline_m_s2{};
   std::array<double, kMaxRotors> baseline_sigma_m_s2{};
+  std::array<double, kMaxRotors> baseline_power{};  ///< of the signal-power filter, (U/U₀)²
   double response = 1.0;       ///< acceleration felt / force over mass, mean of x and y, near the rotor speed
   double against_ratio = 0.3;  ///< part of the vibration that turns against the rotor, of an uneven airframe
   double low_pass_Hz = 0.0;    ///< of the accelerometer; 0 = not known
@@ -41,6 +43,7 @@ struct UnbalanceParams {
 enum class UnbalanceNotJudged : std::uint8_t {
   kJudged,
   kNotFlying,          ///< by the flight phase
+  kInertialStale,      ///< no inertial data for a second
   kConverging,         ///< less than a second of data
   kSpeedUnknown,       ///< rotor speeds missing, stale or too seldom
   kSpeedImplausible,   ///< rotor speeds that do not carry the vehicle, or frozen
@@ -52,10 +55,12 @@ enum class UnbalanceNotJudged : std::uint8_t {
 struct RotorUnbalance {
   double amplitude_m_s2 = 0.0;
   double sigma_m_s2 = 0.0;
-  double growth_m_s2 = 0.0;  ///< over the baseline
+  double against_m_s2 = 0.0;  ///< amplitude of the part that turns against the rotor
+  double growth_m_s2 = 0.0;   ///< over the baseline
   double growth_sigma_m_s2 = 0.0;
-  double log_odds = 0.0;              ///< that this rotor is out of balance, against everything else
-  double test_ratio = 0.0;            ///< alarm at 1
+  bool by_power = false;    ///< by the signal-power filter, as the speeds of the rotors are not known
+  double log_odds = 0.0;    ///< that this rotor is out of balance, against everything else
+  double test_ratio = 0.0;  ///< alarm at 1
   std::uint32_t confounded_with = 0;  ///< bit j: rotor j + 1 cannot be told from this one
   UnbalanceNotJudged reason = UnbalanceNotJudged::kNotFlying;
   FaultLifeCycle::Transition transition = FaultLifeCycle::Transition::kNone;
@@ -72,7 +77,8 @@ struct UnbalanceInnovation {
   std::array<double, kMaxRotors> speed_error_ratio{};  ///< as learned
 };
 
-/// The policy of rotor unbalance over order tracking: who is out of balance, by how much, how sure.
+/// The policy of rotor unbalance over order tracking: who is out of balance, by how much, how sure. Without usable
+/// speeds of the rotors it falls back to the signal-power filter, core/detectors/unbalance/power_fallback.h.
 ///
 /// A rotor is reported when, for `persistence_s`, its growth over the baseline exceeds `smallest_m_s2` by two sigma
 /// and the odds that it is this rotor alone exceed `log_odds`. What is out of balance but cannot be pinned on one
@@ -88,8 +94,13 @@ class UnbalanceMonitor {
   virtual void on_phase(Phase phase) noexcept = 0;
   /// rad/s; NaN = not in this report. A report for another number of rotors is refused.
   virtual void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept = 0;
+  /// Commands, 0 … 1, for the time when no speeds come.
+  virtual void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept = 0;
   /// Horizontal specific force in the body frame. True when the vehicle was judged anew.
   virtual bool on_accel(TimePoint time, double a_x_m_s2, double a_y_m_s2, double window_s) noexcept = 0;
+
+  /// The clock, for the time when no inertial data come. True when the vehicle was judged anew.
+  virtual bool on_clock(TimePoint now) noexcept = 0;
 
   [[nodiscard]] virtual DetectorState state() const noexcept = 0;
   [[nodiscard]] virtual TimePoint judged_at() const noexcept = 0;
@@ -99,6 +110,8 @@ class UnbalanceMonitor {
   [[nodiscard]] virtual std::uint32_t candidates() const noexcept = 0;
   [[nodiscard]] virtual TimePoint ambiguous_since() const noexcept = 0;
   [[nodiscard]] virtual UnbalanceInnovation innovation() const noexcept = 0;
+  /// What the signal-power filter has learned of each rotor, (U/U₀)²: UnbalanceParams::baseline_power for a calibration.
+  [[nodiscard]] virtual std::array<double, kMaxRotors> powers() const noexcept = 0;
 
   /// Mass times radius that makes an amplitude of 1 m/s² at hover speed. kg·m.
   [[nodiscard]] static double kg_m_per_m_s2(const UnbalanceParams& params) noexcept;

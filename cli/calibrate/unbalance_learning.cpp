@@ -1,0 +1,335 @@
+#include "cli/calibrate/unbalance_learning.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "cli/calibrate/learning.h"
+#include "cli/eval/flight_run.h"
+#include "runtime/bus/channels.h"
+#include "services/unbalance/unbalance_service.h"
+
+namespace airworthy::calibrate {
+namespace {
+
+using unbalance::UnbalanceConfig;
+
+constexpr double kLatencyStep_s = 0.004;
+constexpr int kLatencies = 16;
+constexpr double kBetterBy = 1.01;  // in power, for a latency that is not the shortest
+constexpr Duration kBeforeOnset{500'000};
+constexpr double kSigmas = 2.0;  // that the detector asks for
+constexpr double kLeastSpeedNoise = 0.001;
+constexpr double kMostSpeedNoise = 0.05;
+
+/// What the monitor said of one rotor, judgement by judgement.
+struct RotorRecord {
+  std::vector<double> amplitude_m_s2;
+  std::vector<double> against_m_s2;
+  std::vector<double> sigma_m_s2;
+};
+
+struct FlightRecord {
+  std::string log;
+  std::string vehicle;
+  std::vector<RotorRecord> rotors;
+  std::vector<std::vector<double>> speed_rpm;  ///< reports of each rotor, in flight
+  std::array<double, kMaxRotors> powers{};     ///< of the signal-power filter at the end
+  std::int64_t judgements = 0;
+  UnbalanceNotJudged last_reason = UnbalanceNotJudged::kNotFlying;
+
+  [[nodiscard]] double power() const {
+    double sum = 0.0;
+    for (const RotorRecord& rotor : rotors) {
+      for (const double a : rotor.amplitude_m_s2) sum += a * a;
+    }
+    return sum;
+  }
+};
+
+struct Judgement {
+  TimePoint time;
+  std::array<double, kMaxRotors> powers;
+  std::vector<RotorUnbalance> rotors;
+};
+
+void keep(const Judgement& judgement, FlightRecord& record) {
+  ++record.judgements;
+  for (std::size_t i = 0; i < judgement.rotors.size(); ++i) {
+    const RotorUnbalance& rotor = judgement.rotors[i];
+    if (rotor.reason != UnbalanceNotJudged::kJudged) {
+      record.last_reason = rotor.reason;
+      continue;
+    }
+    record.rotors[i].amplitude_m_s2.push_back(rotor.amplitude_m_s2);
+    record.rotors[i].against_m_s2.push_back(rotor.against_m_s2);
+    record.rotors[i].sigma_m_s2.push_back(rotor.sigma_m_s2);
+  }
+}
+
+/// Plays a log through the monitor as configured.
+rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceConfig& config,
+                                       bool whole_flight) {
+  std::vector<Judgement> judgements;
+  std::vector<std::pair<TimePoint, std::vector<double>>> reports;
+  const auto flight = eval::run_flight(log, "airworthy-unbalance", [&](rt::Node& node) {
+    node.subscribe<esc_status_t>(channel::kEscStatus, [&](const esc_status_t& message) {
+      reports.emplace_back(from_us(message.header.time_us), message.speed_rpm);
+    });
+    auto service = std::make_shared<unbalance::UnbalanceService>(node, config);
+    service->observe([&](const UnbalanceMonitor& monitor) {
+      if (monitor.state() != DetectorState::kMonitoring) return;
+      judgements.push_back(
+          {monitor.judged_at(), monitor.powers(), {monitor.rotors().begin(), monitor.rotors().end()}});
+    });
+    return service;
+  });
+  if (!flight) return tl::unexpected<rt::Error>{flight.error()};
+  const TimePoint until = !whole_flight && flight->truth && flight->truth->onset
+                              ? *flight->truth->onset - kBeforeOnset
+                              : TimePoint::max();
+  const std::size_t rotors = config.monitor.vehicle.rotor_count;
+  FlightRecord record{log, flight->vehicle, std::vector<RotorRecord>(rotors),
+                      std::vector<std::vector<double>>(rotors)};
+  for (const Judgement& judgement : judgements) {
+    if (judgement.time >= until) continue;
+    keep(judgement, record);
+    record.powers = judgement.powers;
+  }
+  for (const auto& [time, speeds] : reports) {
+    const bool in_flight = !judgements.empty() && time >= judgements.front().time &&
+                           time <= judgements.back().time && time < until;
+    for (std::size_t i = 0; in_flight && i < std::min(rotors, speeds.size()); ++i) {
+      if (std::isfinite(speeds[i])) record.speed_rpm[i].push_back(std::abs(speeds[i]));
+    }
+  }
+  return record;
+}
+
+rt::Expected<std::vector<FlightRecord>> read_flights(const std::vector<std::string>& logs,
+                                                     const UnbalanceConfig& config, unsigned jobs) {
+  std::vector<rt::Expected<FlightRecord>> read(logs.size());
+  for_each_parallel(logs.size(), jobs, [&](std::size_t i) { read[i] = read_flight(logs[i], config, false); });
+  std::vector<FlightRecord> records;
+  std::string errors;
+  for (auto& one : read) {
+    if (one && one->vehicle != config.vehicle) {
+      one = rt::fail_with(
+          fmt::format("{}: of vehicle \"{}\", not of \"{}\"", one->log, one->vehicle, config.vehicle));
+    }
+    if (one) {
+      records.push_back(std::move(*one));
+    } else {
+      errors += (errors.empty() ? "" : "\n") + one.error().text;
+    }
+  }
+  if (!errors.empty()) return rt::fail_with(errors);
+  return records;
+}
+
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// (2), the median over the rotors; empty without enough reports.
+std::optional<double> speed_noise(const std::vector<FlightRecord>& flights) {
+  std::vector<double> ratios;
+  for (const FlightRecord& flight : flights) {
+    for (const std::vector<double>& speed : flight.speed_rpm) {
+      std::vector<double> bends;
+      for (std::size_t k = 1; k + 1 < speed.size(); ++k) {
+        bends.push_back(std::abs(speed[k - 1] - 2.0 * speed[k] + speed[k + 1]));
+      }
+      if (bends.size() > 50) ratios.push_back(1.4826 * median(bends) / std::sqrt(6.0) / median(speed));
+    }
+  }
+  if (ratios.empty()) return std::nullopt;
+  return std::clamp(median(ratios), kLeastSpeedNoise, kMostSpeedNoise);
+}
+
+/// All judgements of one rotor in all flights.
+RotorRecord pooled(const std::vector<FlightRecord>& flights, std::size_t rotor) {
+  RotorRecord all;
+  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  for (const FlightRecord& flight : flights) {
+    append(all.amplitude_m_s2, flight.rotors[rotor].amplitude_m_s2);
+    append(all.against_m_s2, flight.rotors[rotor].against_m_s2);
+    append(all.sigma_m_s2, flight.rotors[rotor].sigma_m_s2);
+  }
+  return all;
+}
+
+const char* words_for(UnbalanceNotJudged reason) {
+  switch (reason) {
+    case UnbalanceNotJudged::kUnfitInertialData:
+      return "the inertial data are unfit: averaged, filtered or too seldom";
+    case UnbalanceNotJudged::kConfounded:
+      return "it turns too much like another rotor: fly manoeuvres, not a still hover";
+    default:
+      return "too little information: too much noise, or rotor speeds too seldom";
+  }
+}
+
+rt::Expected<void> check_coverage(const std::vector<FlightRecord>& flights, std::size_t rotors) {
+  std::int64_t judgements = 0;
+  UnbalanceNotJudged reason = UnbalanceNotJudged::kConverging;
+  for (const FlightRecord& flight : flights) {
+    judgements += flight.judgements;
+    if (flight.last_reason != UnbalanceNotJudged::kNotFlying) reason = flight.last_reason;
+  }
+  const double period_s = to_seconds(UnbalanceMonitor::kPeriod);
+  if (static_cast<double>(judgements) * period_s < kLeastJudged_s) {
+    return rt::fail_with(
+        fmt::format("only {:.1f} s of flight could be judged, {:g} s are needed; does it fly, with rotor "
+                    "speeds and inertial "
+                    "data?",
+                    static_cast<double>(judgements) * period_s, kLeastJudged_s));
+  }
+  std::string errors;
+  for (std::size_t i = 0; i < rotors; ++i) {
+    const double seen_s = static_cast<double>(pooled(flights, i).amplitude_m_s2.size()) * period_s;
+    if (seen_s >= kLeastJudged_s) continue;
+    errors += fmt::format("{}rotor {} could be judged for {:.1f} s only, {:g} s are needed: {}",
+                          errors.empty() ? "" : "\n", i + 1, seen_s, kLeastJudged_s, words_for(reason));
+  }
+  if (!errors.empty()) return rt::fail_with(errors);
+  return {};
+}
+
+/// (1). Flights are read once per candidate.
+rt::Expected<double> best_latency(const std::vector<std::string>& logs, UnbalanceConfig config,
+                                  unsigned jobs) {
+  double best_s = 0.0;
+  double best_power = 0.0;
+  for (int k = 0; k < kLatencies; ++k) {
+    config.monitor.speed_latency_s = k * kLatencyStep_s;
+    const auto flights = read_flights(logs, config, jobs);
+    if (!flights) return tl::unexpected<rt::Error>{flights.error()};
+    double power = 0.0;
+    for (const FlightRecord& flight : *flights) power += flight.power();
+    if (power > (k == 0 ? 0.0 : kBetterBy * best_power)) {
+      best_power = power;
+      best_s = config.monitor.speed_latency_s;
+    }
+  }
+  return best_s;
+}
+
+/// (4) for the trials of one rotor: acceleration that the trial mass made.
+double trial_amplitude(const std::vector<double>& seen_m_s2, double baseline_m_s2) {
+  if (seen_m_s2.size() == 1) return seen_m_s2.front() - baseline_m_s2;
+  double power = 0.0;
+  for (const double seen : seen_m_s2) power += seen * seen / static_cast<double>(seen_m_s2.size());
+  return std::sqrt(std::max(0.0, power - baseline_m_s2 * baseline_m_s2));
+}
+
+rt::Expected<void> learn_response(const std::vector<TrialFlight>& trials, const UnbalanceConfig& config,
+                                  LearnedUnbalance& learned) {
+  std::map<std::pair<int, double>, std::vector<double>> seen;
+  for (const TrialFlight& trial : trials) {
+    const auto flight = read_flight(trial.log, config, true);
+    if (!flight) return tl::unexpected<rt::Error>{flight.error()};
+    const auto& amplitudes = flight->rotors[static_cast<std::size_t>(trial.rotor - 1)].amplitude_m_s2;
+    if (static_cast<double>(amplitudes.size()) * to_seconds(UnbalanceMonitor::kPeriod) < kLeastJudged_s) {
+      return rt::fail_with(
+          fmt::format("{}: rotor {} could not be judged for {:g} s", trial.log, trial.rotor, kLeastJudged_s));
+    }
+    seen[{trial.rotor, trial.tip_mass_mg}].push_back(median(amplitudes));
+  }
+  std::vector<double> responses;
+  for (const auto& [trial, amplitudes] : seen) {
+    const auto& [rotor, tip_mass_mg] = trial;
+    const double made = trial_amplitude(
+        amplitudes, learned.calibration.rotors[static_cast<std::size_t>(rotor - 1)].baseline_m_s2);
+    const double moment_kg_m = 1e-6 * tip_mass_mg * config.monitor.vehicle.propeller_radius_m;
+    responses.push_back(config.monitor.response * made * UnbalanceMonitor::kg_m_per_m_s2(config.monitor) /
+                        moment_kg_m);
+    if (amplitudes.size() == 1) {
+      learned.notes.push_back(
+          fmt::format("rotor {}: one trial only; fly again with the mass on the other blade, or its phase "
+                      "against the natural "
+                      "unbalance is guessed",
+                      rotor));
+    }
+  }
+  const double response = median(responses);
+  if (!(response > 0.0))
+    return rt::fail_with("the trial mass made no vibration: is it on the rotor that was named?");
+  learned.calibration.response = response;
+  learned.calibration.has_trial_mass = true;
+  return {};
+}
+
+}  // namespace
+
+rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& logs,
+                                               const std::vector<TrialFlight>& trials,
+                                               const UnbalanceConfig& config, unsigned jobs) {
+  UnbalanceConfig tuned = config;
+  const std::size_t rotors = config.monitor.vehicle.rotor_count;
+  auto flights = read_flights(logs, tuned, jobs);
+  if (!flights) return tl::unexpected<rt::Error>{flights.error()};
+  if (const auto covered = check_coverage(*flights, rotors); !covered) {
+    return tl::unexpected<rt::Error>{covered.error()};
+  }
+  if (const auto noise = speed_noise(*flights)) tuned.monitor.speed_noise_ratio = *noise;
+  const auto latency = best_latency(logs, tuned, jobs);
+  if (!latency) return tl::unexpected<rt::Error>{latency.error()};
+  tuned.monitor.speed_latency_s = *latency;
+  flights = read_flights(logs, tuned, jobs);
+  if (!flights) return tl::unexpected<rt::Error>{flights.error()};
+  if (const auto covered = check_coverage(*flights, rotors); !covered) {
+    return tl::unexpected<rt::Error>{covered.error()};
+  }
+
+  LearnedUnbalance learned;
+  unbalance::Calibration& calibration = learned.calibration;
+  calibration.vehicle = config.vehicle;
+  calibration.flights = static_cast<int>(logs.size());
+  calibration.accel_low_pass_Hz = config.monitor.low_pass_Hz;
+  calibration.speed_latency_s = tuned.monitor.speed_latency_s;
+  calibration.speed_noise_ratio = tuned.monitor.speed_noise_ratio;
+  calibration.response = config.monitor.response;
+  for (const FlightRecord& flight : *flights) {
+    calibration.judged_s += static_cast<double>(flight.judgements) * to_seconds(UnbalanceMonitor::kPeriod);
+  }
+  double power = 0.0;
+  double against = 0.0;
+  for (std::size_t i = 0; i < rotors; ++i) {
+    const RotorRecord all = pooled(*flights, i);
+    const double baseline = mean(all.amplitude_m_s2);
+    double variance = 0.0;  // (3)
+    for (const double a : all.amplitude_m_s2) {
+      variance += (a - baseline) * (a - baseline) / static_cast<double>(all.amplitude_m_s2.size());
+    }
+    double filter_power = 0.0;
+    for (const FlightRecord& flight : *flights) {
+      filter_power += flight.powers[i] / static_cast<double>(flights->size());
+    }
+    calibration.rotors.push_back({baseline, std::sqrt(variance), filter_power});
+    learned.smallest_growth_m_s2.push_back(config.monitor.smallest_m_s2 +
+                                           kSigmas * std::hypot(median(all.sigma_m_s2), std::sqrt(variance)));
+    for (const double a : all.amplitude_m_s2) power += a * a;
+    for (const double a : all.against_m_s2) against += a * a;
+  }
+  calibration.against_ratio = power > 0.0 ? std::clamp(std::sqrt(against / power), 0.05, 1.0) : 0.3;
+  if (!trials.empty()) {
+    if (const auto measured = learn_response(trials, tuned, learned); !measured) {
+      return tl::unexpected<rt::Error>{measured.error()};
+    }
+  }
+  return learned;
+}
+
+}  // namespace airworthy::calibrate

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/error.h"
+#include "services/unbalance/calibration.h"
+#include "services/unbalance/unbalance_config.h"
+
+namespace airworthy::calibrate {
+
+/// A flight with a known mass on one propeller, to measure what the inertial unit feels of it.
+struct TrialFlight {
+  std::string log;
+  int rotor = 0;  ///< 1-based
+  double tip_mass_mg = 0.0;
+};
+
+struct LearnedUnbalance {
+  unbalance::Calibration calibration;
+  std::vector<double> smallest_growth_m_s2;  ///< of each rotor: what is found in half of the judgements
+  std::vector<std::string> notes;
+};
+
+/// Less of judged flight says too little about a rotor.
+inline constexpr double kLeastJudged_s = 20.0;
+
+/// Learns the balance of a vehicle's propellers from healthy flights (of a flight with a GROUND_TRUTH fault, the part
+/// before it).
+///   Latency    of the telemetry: of 0, 4, … 60 ms the one for which the tracked power of all rotors is largest     (1)
+///   Noise      of a report: 1.4826·median|ωₖ₋₁ − 2ωₖ + ωₖ₊₁|/√6 over the speed                                  (2)
+///   Baseline   mean amplitude of each rotor; sigma: of single judgements around it, flights pooled              (3)
+///   Response   a trial mass m at radius r makes response·m·r·ω₀²/M. Two trials, the mass once on either blade of the
+///              rotor: its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b. One trial: a − b, right
+///              only where the mass adds to the baseline                                                       (4)
+/// Refuses logs of other vehicles, too little judged flight, and rotors that were never judged, with the reason.
+[[nodiscard]] rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& logs,
+                                                             const std::vector<TrialFlight>& trials,
+                                                             const unbalance::UnbalanceConfig& config,
+                                                             unsigned jobs);
+
+}  // namespace airworthy::calibrate
