@@ -214,14 +214,29 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
 }
 
 template <std::size_t N>
+void RotorUnbalanceMonitor<N>::note_leader(
+    const std::optional<typename Hypotheses::Verdict>& verdict) noexcept {
+  for (std::size_t i = 0; i < N; ++i) {
+    leads_[i] = verdict.has_value();
+    for (std::size_t j = 0; j < N && leads_[i]; ++j) {
+      if (j == i || is_known_[j]) continue;
+      leads_[i] = verdict->log_likelihood_ratio[i] - verdict->log_likelihood_ratio[j] > params_.log_lead;
+    }
+  }
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
+  somebody_has_grown_ = false;
   for (std::size_t i = 0; i < N; ++i) {
     RotorUnbalance& rotor = rotor_[i];
     const double doubt = kSigmas * rotor.growth_sigma_m_s2;
     // A usual unbalance that nobody has measured is no growth.
     const double least =
         params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
-    grown_[i].step(!is_known_[i] && rotor.growth_m_s2 - doubt > least, now);
+    const bool has_grown = !is_known_[i] && rotor.growth_m_s2 - doubt > least;
+    somebody_has_grown_ = somebody_has_grown_ || (has_grown && !leads_[i]);
+    grown_[i].step(has_grown && leads_[i], now);
     if (is_known_[i]) {
       rotor.test_ratio = (rotor.growth_m_s2 + doubt) / least;
     } else {
@@ -242,8 +257,10 @@ void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_fau
     most = std::max(most, rotor.log_odds);
     most_growth = std::max(most_growth, rotor.growth_m_s2);
   }
-  const bool is_nobodys =
-      log_odds_faulty > params_.log_odds && most < params_.log_odds && most_growth > params_.smallest_m_s2;
+  const bool is_nobodys = (log_odds_faulty > params_.log_odds && most < params_.log_odds &&
+                           most_growth > params_.smallest_m_s2) ||
+                          (somebody_has_grown_ && std::none_of(is_known_.begin(), is_known_.end(),
+                                                               [](bool known) { return known; }));
   ambiguous_.step(is_nobodys, now);
   if (is_nobodys && !ambiguity_life_.active()) {
     candidates_ = 0;
@@ -319,6 +336,7 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   estimate(dt_s);
   const auto verdict = Hypotheses::test(tracker_, prior_, is_known_, params_.smallest_m_s2);
   for (std::size_t i = 0; i < N; ++i) rotor_[i].log_odds = verdict ? verdict->log_odds[i] : 0.0;
+  note_leader(verdict);
   test_rotors(now);
   test_ambiguity(now, verdict ? verdict->log_odds_faulty : 0.0);
 }

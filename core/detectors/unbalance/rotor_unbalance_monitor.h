@@ -47,6 +47,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   void judge(TimePoint now) noexcept;
   void estimate(double dt_s) noexcept;
   void test_rotors(TimePoint now) noexcept;
+  void note_leader(const std::optional<typename Hypotheses::Verdict>& verdict) noexcept;
   void test_ambiguity(TimePoint now, double log_odds_faulty) noexcept;
   void judge_by_power(TimePoint now, double dt_s) noexcept;
   void mute(UnbalanceNotJudged reason, TimePoint now) noexcept;
@@ -63,6 +64,8 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   std::array<double, N> against_power_m2_s4_{};
   std::array<FaultLifeCycle, N> life_;
   std::array<Held, N> grown_{};
+  std::array<bool, N> leads_{};      ///< explains what is felt better than any other rotor, by log_lead
+  bool somebody_has_grown_ = false;  ///< that does not lead
   std::array<bool, N> is_known_{};
   FaultLifeCycle ambiguity_life_;
   FaultLifeCycle::Transition ambiguity_ = FaultLifeCycle::Transition::kNone;

@@ -34,6 +34,7 @@ struct UnbalanceParams {
   double most_speed_error_ratio =
       0.0;                         ///< that it may be off the above; followed in flight, 0 = not followed
   double log_odds = 9.2;           ///< of one certain rotor against everything else, to blame it: 10 000 to 1
+  double log_lead = 3.0;           ///< of the rotor that is blamed over every other one: 20 to 1
   double persistence_s = 0.5;      ///< of the growth before it is reported
   double ambiguous_after_s = 5.0;  ///< of an unbalance that is nobody's yet, before it is reported as such
   FaultLifeCycleParams life_cycle{.clear_ratio = 0.5, .clear_after = Duration{10'000'000}};
@@ -81,7 +82,8 @@ struct UnbalanceInnovation {
 /// speeds of the rotors it falls back to the signal-power filter, core/detectors/unbalance/power_fallback.h.
 ///
 /// A rotor is reported when, for `persistence_s`, its growth over the baseline exceeds `smallest_m_s2` by two sigma
-/// and the odds that it is this rotor alone exceed `log_odds`. What is out of balance but cannot be pinned on one
+/// and it explains what is felt better than any other rotor would, by `log_lead`: where two turn too alike the growth of
+/// one shows in the other's amplitude too. What is out of balance but cannot be pinned on one
 /// rotor for `ambiguous_after_s` is reported as such, with the candidates. Judged in flight only.
 class UnbalanceMonitor {
  public:
