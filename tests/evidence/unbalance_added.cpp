@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tests/evidence/unbalance_recorded.h"
 
@@ -13,24 +14,31 @@ struct Link {
   const char* name;
   SpeedTelemetry telemetry;
   double told_latency_s;
-  bool follows_clocks;
+  bool follows_clocks = true;
+  bool needs_lead = true;  ///< of the rotor that is blamed over the others
 };
 
 constexpr double kResolution_rad_s = 1.5;  // 100 electrical rev/min of 7 pole pairs
-const std::array kLinks{Link{"as recorded", {}, 0.0, true},
-                        Link{"as recorded, clocks not followed", {}, 0.0, false},
-                        Link{"50 Hz, 8 ms late",
-                             {.delay_s = 0.008, .period_s = 0.02, .resolution_rad_s = kResolution_rad_s},
-                             0.008,
-                             true},
-                        Link{"50 Hz, 50 ms late",
-                             {.delay_s = 0.05, .period_s = 0.02, .resolution_rad_s = kResolution_rad_s},
-                             0.05,
-                             true},
-                        Link{"50 Hz, 50 ms late, told 8 ms",
-                             {.delay_s = 0.05, .period_s = 0.02, .resolution_rad_s = kResolution_rad_s},
-                             0.008,
-                             true}};
+constexpr SpeedTelemetry kFast{};
+constexpr SpeedTelemetry kLate8{.delay_s = 0.008, .period_s = 0.02, .resolution_rad_s = kResolution_rad_s};
+constexpr SpeedTelemetry kLate50{.delay_s = 0.05, .period_s = 0.02, .resolution_rad_s = kResolution_rad_s};
+constexpr std::array kLinks{
+    Link{.name = "as recorded", .telemetry = kFast, .told_latency_s = 0.0},
+    Link{.name = "50 Hz, 8 ms late", .telemetry = kLate8, .told_latency_s = 0.008},
+    Link{.name = "50 Hz, 50 ms late", .telemetry = kLate50, .told_latency_s = 0.05},
+    Link{.name = "50 Hz, 50 ms late, told 8 ms", .telemetry = kLate50, .told_latency_s = 0.008},
+    Link{.name = "as recorded; no lead needed",
+         .telemetry = kFast,
+         .told_latency_s = 0.0,
+         .needs_lead = false},
+    Link{.name = "50 Hz, 8 ms late; no lead needed",
+         .telemetry = kLate8,
+         .told_latency_s = 0.008,
+         .needs_lead = false},
+    Link{.name = "as recorded; clocks not followed",
+         .telemetry = kFast,
+         .told_latency_s = 0.0,
+         .follows_clocks = false}};
 
 /// A flight to be spoilt: from when on, and the baseline that the monitor has then.
 struct Trial {
@@ -100,6 +108,7 @@ UnbalanceParams params_for(const RecordedSet& set, const Link& link) {
   UnbalanceParams params = set.params;
   params.speed_latency_s = link.told_latency_s;
   if (!link.follows_clocks) params.most_speed_error_ratio = 0.0;
+  if (!link.needs_lead) params.log_lead = std::numeric_limits<double>::lowest();
   return params;
 }
 
@@ -194,6 +203,8 @@ json added_to(const RecordedSet& set, std::vector<Trial> (*trials_of)(const Reco
   return {
       {"set", set.name},
       {"links", links},
+      {"mass_kg", set.params.vehicle.mass_kg},
+      {"radius_mm", 1e3 * set.params.vehicle.propeller_radius_m},
       {"g_mm_per_m_s2_and_kg", 1e6 / std::pow(UnbalanceMonitor::hover_speed_rad_s(set.params.vehicle), 2)}};
 }
 
