@@ -110,12 +110,13 @@ RecordedFlight load_crazyflie(const std::filesystem::path& file) {
 }
 
 std::vector<RecordedFlight> load_all(const std::filesystem::path& folder,
-                                     RecordedFlight (*load_one)(const std::filesystem::path&)) {
+                                     RecordedFlight (*load_one)(const std::filesystem::path&),
+                                     const std::string& begins) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator{folder, error}) {
-    if (entry.path().filename().string().ends_with(".csv.xz") && entry.path().filename() != "index.csv.xz")
-      files.push_back(entry.path());
+    const std::string name = entry.path().filename().string();
+    if (name.ends_with(".csv.xz") && name.starts_with(begins)) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   std::vector<RecordedFlight> flights;

@@ -35,9 +35,10 @@ struct RecordedFlight {
 [[nodiscard]] RecordedFlight load_bebop(const std::filesystem::path& file);
 [[nodiscard]] RecordedFlight load_thrown(const std::filesystem::path& file);
 [[nodiscard]] RecordedFlight load_crazyflie(const std::filesystem::path& file);
-/// Every file of a set by the loader, in the order of their names.
+/// Every file of a set whose name begins so, by the loader, in the order of their names.
 [[nodiscard]] std::vector<RecordedFlight> load_all(const std::filesystem::path& folder,
-                                                   RecordedFlight (*load)(const std::filesystem::path&));
+                                                   RecordedFlight (*load)(const std::filesystem::path&),
+                                                   const std::string& begins = "");
 
 /// What becomes of the speed between the rotor and the monitor.
 struct SpeedTelemetry {

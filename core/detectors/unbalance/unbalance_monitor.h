@@ -29,13 +29,13 @@ struct UnbalanceParams {
   double low_pass_Hz = 0.0;    ///< of the accelerometer; 0 = not known
   double speed_latency_s = 0.0;  ///< of the telemetry
   double speed_noise_ratio = 0.004;
-  std::array<double, kMaxRotors>
-      speed_error_ratio{};  ///< true over reported speed, less 1: clocks of the controllers
+  /// True over reported speed, less 1: motor controllers have clocks of their own.
+  std::array<double, kMaxRotors> speed_error_ratio{};
   double most_speed_error_ratio =
-      0.0;                         ///< that it may be off the above; followed in flight, 0 = not followed
-  double log_odds = 9.2;           ///< of one certain rotor against everything else, to blame it: 10 000 to 1
-  double log_lead = 3.0;           ///< of the rotor that is blamed over every other one: 20 to 1
-  double persistence_s = 0.5;      ///< of the growth before it is reported
+      0.01;                    ///< they may be off the above, and are followed in flight; 0 = not followed
+  double log_odds = 9.2;       ///< of one certain rotor against everything else, to blame it: 10 000 to 1
+  double log_lead = 3.0;       ///< of the rotor that is blamed over every other one: 20 to 1
+  double persistence_s = 0.5;  ///< of the growth before it is reported
   double ambiguous_after_s = 5.0;  ///< of an unbalance that is nobody's yet, before it is reported as such
   FaultLifeCycleParams life_cycle{.clear_ratio = 0.5, .clear_after = Duration{10'000'000}};
 };

@@ -1,10 +1,11 @@
+#include "tests/support/recorded_sets.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 
 #include "core/math/phasor.h"
-#include "tests/evidence/unbalance_recorded.h"
 
 namespace airworthy::testing {
 
@@ -16,7 +17,6 @@ RecordedSet bebop_set(const std::filesystem::path& data) {
                                  const auto& row) { return to_seconds(row.time - start) > kBebopTo_s; });
   if (!flight.rows.empty()) set.flights.push_back(std::move(flight));
   set.params.vehicle = vehicle_called("bebop2");
-  set.params.most_speed_error_ratio = 0.01;
   // Its vibration turns against the rotor as much as with it.
   set.params.against_ratio = 1.0;
   return set;
@@ -33,7 +33,6 @@ RecordedSet thrown_set(const std::filesystem::path& data) {
   set.params.smallest_m_s2 = 0.02;
   set.params.caution_m_s2 = 0.06;
   set.params.usual_m_s2 = 0.025;
-  set.params.most_speed_error_ratio = 0.005;
   return set;
 }
 
@@ -42,7 +41,6 @@ RecordedSet crazyflie_set(const std::filesystem::path& data) {
   set.flights = load_all(data / set.name, load_crazyflie);
   set.params.vehicle = vehicle_called("crazyflie_brushless");
   set.params.low_pass_Hz = 30.0;  // of the firmware's accelerometer filter
-  set.params.most_speed_error_ratio = 0.005;
   return set;
 }
 
