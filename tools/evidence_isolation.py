@@ -33,7 +33,7 @@ FIELDS = ("condition", "vehicle", "manoeuvre", "seed", "truth", "named", "damage
 
 def flights(job):
     condition, vehicle, manoeuvre, first, count = job
-    done = run("nice", "-n", "10", ROOT / "build/dev/tests/unbalance_isolation", condition, vehicle, manoeuvre, first, count,
+    done = run("nice", "-n", "10", ROOT / "build/dev/evidence/unbalance_isolation", condition, vehicle, manoeuvre, first, count,
                capture_output=True)
     if done.returncode != 0:
         raise Failed(f"unbalance_isolation {condition} {vehicle} {manoeuvre} failed:\n{done.stderr}")

@@ -15,7 +15,7 @@ WORDS = ("experiment", "flight", "source")
 
 def flights(job):
     name, seed = job
-    done = run("nice", "-n", "10", ROOT / "build/dev/tests/unbalance_power", name, seed, 1, capture_output=True)
+    done = run("nice", "-n", "10", ROOT / "build/dev/evidence/unbalance_power", name, seed, 1, capture_output=True)
     if done.returncode != 0:
         raise Failed(f"unbalance_power {name} failed:\n{done.stderr}")
     return done.stdout.splitlines()

@@ -17,8 +17,10 @@ namespace airworthy {
 /// What is believed of a rotor before the flight is looked at.
 template <class Scalar, std::size_t N>
 struct UnbalancePrior {
-  std::array<int, N> spin{};                        ///< +1 clockwise seen from above
-  std::array<Scalar, N> amplitude_m_s2{};           ///< usual |A₊|, rms
+  std::array<int, N> spin{};               ///< +1 clockwise seen from above
+  std::array<Scalar, N> amplitude_m_s2{};  ///< usual |A₊|: its rms, or what a calibration says
+  bool is_calibrated = false;              ///< then |A₊| is usually within `sigma_m_s2` of amplitude_m_s2
+  std::array<Scalar, N> sigma_m_s2{};
   Scalar against_ratio = static_cast<Scalar>(0.3);  ///< |A₋|/|A₊| of an airframe softer in one direction
   Scalar fault_probability = static_cast<Scalar>(1e-4);  ///< of each rotor being out of balance
 };
@@ -30,6 +32,9 @@ struct UnbalancePrior {
 ///   ln p(z|Hᵢ)/p(z|H₀) = ½·rᵢᵀ·(Δ⁻¹ + Wᵢᵢ)⁻¹·rᵢ − ½·ln det(I + Δ·Wᵢᵢ),  W = C⁻¹,  r = W·z              (3)
 ///   Prior   D(a) of one rotor: A₊ ~ N(0, a²), A₋ ~ N(0, (ρ·a)²), complex, independent; X = A₊ + A₋,
 ///           Y = −j·s·(A₊ − A₋)                                                                        (4)
+///   Calibrated  the magnitude b of A₊ is known, its phase is not: with u = Â/|Â|, A₊ ~ N(b·u, σ² along u, ½·b² across),
+///           z less these means; Hᵢ adds a growth g along u, g² = max(||Âᵢ| − bᵢ|, smallest)², to (2): Δ = g²·u·uᵀ, and
+///           ½·(ρ·g)² to A₋. A rotor that has always shaken must not need to shake more to be blamed      (5)
 ///   Source  matrix determinant lemma and Woodbury's identity; docs/equations/order_tracking.md
 /// z is taken for the truth plus an error of P. The filter's own prior draws it towards 0 where nothing is known, and
 /// the P of there is so wide that what is lacking does not matter.
@@ -55,14 +60,6 @@ class RotorHypotheses {
                                                    const std::array<bool, N>& known,
                                                    Scalar smallest_m_s2) noexcept {
     BoundedMatrix<Scalar, kSize> C = BoundedMatrix<Scalar, kSize>::Zero(kSize, kSize);
-    std::array<Scalar, N> usual2{};
-    std::array<Scalar, N> faulty2{};
-    for (std::size_t k = 0; k < N; ++k) {
-      const Scalar seen2 = tracker.turning_m_s2(k, prior.spin[k]).squared();
-      const Scalar usual = prior.amplitude_m_s2[k];
-      faulty2[k] = usual * usual + std::max(seen2, smallest_m_s2 * smallest_m_s2);
-      usual2[k] = known[k] ? faulty2[k] : usual * usual;
-    }
     for (std::size_t i = 0; i < 2 * N; ++i) {
       for (std::size_t j = 0; j < 2 * N; ++j) {
         const auto row = static_cast<int>(i);
@@ -70,15 +67,20 @@ class RotorHypotheses {
         C(row, column) = C(kSize / 2 + row, kSize / 2 + column) = tracker.covariance_m2_s4(i, j);
       }
     }
+    std::array<Belief, N> belief;
+    Eigen::Matrix<Scalar, kSize, 1> z = amplitudes(tracker);
     for (std::size_t k = 0; k < N; ++k) {
-      const Block D = usual2[k] * unit_prior(prior.spin[k], prior.against_ratio);
+      belief[k] = belief_of(tracker.turning_m_s2(k, prior.spin[k]), prior, k, smallest_m_s2);
+      Block D = belief[k].usual;
+      if (known[k]) D += belief[k].growth;
       for (int a = 0; a < 4; ++a) {
+        z(place(k, a)) -= belief[k].mean(a);
         for (int b = 0; b < 4; ++b) C(place(k, a), place(k, b)) += D(a, b);
       }
     }
     BoundedMatrix<Scalar, kSize> W;
     if (!invert_positive_definite(C, W)) return std::nullopt;
-    const Eigen::Matrix<Scalar, kSize, 1> r = W * amplitudes(tracker);
+    const Eigen::Matrix<Scalar, kSize, 1> r = W * z;
     Verdict verdict;
     for (std::size_t k = 0; k < N; ++k) {
       if (known[k]) continue;
@@ -88,8 +90,7 @@ class RotorHypotheses {
         r_i(a) = r(place(k, a));
         for (int b = 0; b < 4; ++b) W_i(a, b) = W(place(k, a), place(k, b));
       }
-      const Block Delta = (faulty2[k] - usual2[k]) * unit_prior(prior.spin[k], prior.against_ratio);
-      verdict.log_likelihood_ratio[k] = log_ratio(Delta, W_i, r_i);
+      verdict.log_likelihood_ratio[k] = log_ratio(belief[k].growth, W_i, r_i);
     }
     weigh(known, log(prior.fault_probability), verdict);
     return verdict;
@@ -119,16 +120,52 @@ class RotorHypotheses {
     return z;
   }
 
-  /// (4) for a = 1; half of a complex variance lies in each part.
-  [[nodiscard]] static Block unit_prior(int spin, Scalar against_ratio) noexcept {
+  /// Of one rotor's (Re X, Im X, Re Y, Im Y).
+  struct Belief {
+    Column mean = Column::Zero();
+    Block usual = Block::Zero();   ///< D under H₀
+    Block growth = Block::Zero();  ///< Δ
+  };
+
+  /// What A₊ (or A₋, with the opposite spin) = 1·direction makes of X and Y.
+  [[nodiscard]] static Column seen_of(Phasor<Scalar> direction, int spin) noexcept {
+    const auto s = static_cast<Scalar>(spin);
+    return Column{direction.re, direction.im, s * direction.im, -s * direction.re};
+  }
+
+  /// Variances of A₊ along `direction` and across it, and of either part of A₋.
+  [[nodiscard]] static Block spread(Phasor<Scalar> direction, int spin, Scalar along, Scalar across,
+                                    Scalar against) noexcept {
+    const Column u = seen_of(direction, spin);
+    const Column v = seen_of({-direction.im, direction.re}, spin);
+    const Column a = seen_of({1, 0}, -spin);
+    const Column b = seen_of({0, 1}, -spin);
+    return along * (u * u.transpose()) + across * (v * v.transpose()) +
+           against * (a * a.transpose() + b * b.transpose());
+  }
+
+  [[nodiscard]] static Belief belief_of(Phasor<Scalar> seen, const UnbalancePrior<Scalar, N>& prior,
+                                        std::size_t k, Scalar smallest_m_s2) noexcept {
     const Scalar half = static_cast<Scalar>(0.5);
-    const Scalar against2 = against_ratio * against_ratio;
-    const Scalar own = half * (Scalar{1} + against2);
-    const Scalar cross = half * (Scalar{1} - against2) * static_cast<Scalar>(spin);
-    Block D = own * Block::Identity();
-    D(0, 3) = D(3, 0) = -cross;
-    D(1, 2) = D(2, 1) = cross;
-    return D;
+    const Scalar usual = prior.amplitude_m_s2[k];
+    const Scalar usual2 = half * usual * usual;
+    const Scalar rho2 = prior.against_ratio * prior.against_ratio;
+    const Scalar size = seen.magnitude();
+    const Phasor<Scalar> u = size > Scalar{0} ? Scalar{1} / size * seen : Phasor<Scalar>{1, 0};
+    Belief belief;
+    if (!prior.is_calibrated) {
+      const Scalar faulty = std::max(size, smallest_m_s2);
+      const Scalar more2 = half * faulty * faulty;
+      belief.usual = spread(u, prior.spin[k], usual2, usual2, rho2 * usual2);  // (4)
+      belief.growth = spread(u, prior.spin[k], more2, more2, rho2 * more2);
+      return belief;
+    }
+    const Scalar sigma2 = prior.sigma_m_s2[k] * prior.sigma_m_s2[k];
+    const Scalar growth = std::max(std::abs(size - usual), smallest_m_s2);
+    belief.mean = usual * seen_of(u, prior.spin[k]);  // (5)
+    belief.usual = spread(u, prior.spin[k], sigma2, usual2 + sigma2, rho2 * (usual2 + sigma2));
+    belief.growth = spread(u, prior.spin[k], growth * growth, Scalar{0}, half * rho2 * growth * growth);
+    return belief;
   }
 
   /// (3) by Gaussian elimination of (I + Δ·W)·q = Δ·r.

@@ -22,7 +22,7 @@ constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the small
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
 constexpr double kLeak = 0.05;             // of another rotor's amplitude, that no sigma knows of
 constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
-constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
+constexpr double kMostLoad = 2.5;  // thrust by rotor speeds over weight, and its inverse
 
 SignalPowerParams power_params(const UnbalanceParams& params) {
   SignalPowerParams power;
@@ -67,17 +67,18 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
                 .smallest_m_s2 = params.smallest_m_s2,
                 .speed_latency_s = params.speed_latency_s,
                 .speed_noise_ratio = params.speed_noise_ratio,
+                .most_speed_error_ratio = params.most_speed_error_ratio,
                 .low_pass_Hz = params.low_pass_Hz}},
       fallback_{params.vehicle, power_params(params), first<N>(params.baseline_power)},
       life_{life_cycles(params.life_cycle, std::make_index_sequence<N>{})},
       ambiguity_life_{params.life_cycle} {
   for (std::size_t i = 0; i < N; ++i) {
+    tracker_.start_speed_error(i, params.speed_error_ratio[i]);
     prior_.spin[i] = params.vehicle.rotor[i].spin;
-    prior_.amplitude_m_s2[i] =
-        params.has_baseline
-            ? std::hypot(params.baseline_m_s2[i], params.baseline_sigma_m_s2[i], 0.25 * params.smallest_m_s2)
-            : params.usual_m_s2;
+    prior_.amplitude_m_s2[i] = params.has_baseline ? params.baseline_m_s2[i] : params.usual_m_s2;
+    prior_.sigma_m_s2[i] = std::hypot(params.baseline_sigma_m_s2[i], 0.25 * params.smallest_m_s2);
   }
+  prior_.is_calibrated = params.has_baseline;
   prior_.against_ratio = params.against_ratio;
 }
 
@@ -168,25 +169,27 @@ UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const
 }
 
 template <std::size_t N>
-std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor, bool is_informed) const noexcept {
-  const auto power = [this](std::size_t i, std::size_t j) {
+double RotorUnbalanceMonitor<N>::correlation(std::size_t i, std::size_t j) const noexcept {
+  const auto power = [this](std::size_t row, std::size_t column) {
     double sum = 0.0;
     for (std::size_t a = 0; a < 2; ++a) {
       for (std::size_t b = 0; b < 2; ++b) {
-        const double element = tracker_.covariance_m2_s4(2 * i + a, 2 * j + b);
+        const double element = tracker_.covariance_m2_s4(2 * row + a, 2 * column + b);
         sum += element * element;
       }
     }
     return sum;
   };
+  return std::sqrt(power(i, j) / std::sqrt(power(i, i) * power(j, j)));
+}
+
+template <std::size_t N>
+std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor, bool is_informed) const noexcept {
   std::uint32_t mask = 0;
   for (std::size_t j = 0; j < N; ++j) {
     if (j == rotor) continue;
-    const bool correlates =
-        power(rotor, j) > kConfounded * kConfounded * std::sqrt(power(rotor, rotor) * power(j, j));
-    if (!tracker_.are_apart(rotor, j) || (!is_informed && correlates)) {
-      mask |= 1U << j;
-    }
+    const bool correlates = correlation(rotor, j) > kConfounded;
+    if (!tracker_.are_apart(rotor, j) || (!is_informed && correlates)) mask |= 1U << j;
   }
   return mask;
 }
@@ -241,7 +244,20 @@ double RotorUnbalanceMonitor<N>::largest_but(std::size_t rotor) const noexcept {
 }
 
 template <std::size_t N>
+void RotorUnbalanceMonitor<N>::note_leader(
+    const std::optional<typename Hypotheses::Verdict>& verdict) noexcept {
+  for (std::size_t i = 0; i < N; ++i) {
+    leads_[i] = verdict.has_value();
+    for (std::size_t j = 0; j < N && leads_[i]; ++j) {
+      if (j == i || is_known_[j]) continue;
+      leads_[i] = verdict->log_likelihood_ratio[i] - verdict->log_likelihood_ratio[j] > params_.log_lead;
+    }
+  }
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
+  somebody_has_grown_ = false;
   for (std::size_t i = 0; i < N; ++i) {
     RotorUnbalance& rotor = rotor_[i];
     const double doubt = kSigmas * rotor.growth_sigma_m_s2;
@@ -250,7 +266,9 @@ void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
     const double least =
         params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
     const bool is_judged = rotor.reason == UnbalanceNotJudged::kJudged;
-    grown_[i].step(!is_known_[i] && is_judged && tracker_.explains() && surely_grown > least, now);
+    const bool has_grown = !is_known_[i] && is_judged && tracker_.explains() && surely_grown > least;
+    somebody_has_grown_ = somebody_has_grown_ || (has_grown && !leads_[i]);
+    grown_[i].step(has_grown && leads_[i], now);
     if (is_known_[i]) {
       // What was found stays found while another rotor might take its place.
       rotor.test_ratio = is_judged ? (rotor.growth_m_s2 + doubt) / least : 1.0;
@@ -290,8 +308,11 @@ void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_fau
     most_growth = std::max(most_growth, shared_growth_m_s2(i));
     if (rotor.log_odds > -params_.log_odds) suspects |= 1U << i;
   }
+  const bool nobody_is_known =
+      std::none_of(is_known_.begin(), is_known_.end(), [](bool known) { return known; });
   const bool is_nobodys =
-      log_odds_faulty > params_.log_odds && !is_pinned && most_growth > params_.smallest_m_s2;
+      (log_odds_faulty > params_.log_odds && !is_pinned && most_growth > params_.smallest_m_s2) ||
+      (somebody_has_grown_ && nobody_is_known);
   ambiguous_.step(is_nobodys, now);
   if (is_nobodys && !ambiguity_life_.active()) {
     candidates_ = suspects;
@@ -367,6 +388,7 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   estimate(dt_s);
   const auto verdict = Hypotheses::test(tracker_, prior_, is_known_, params_.smallest_m_s2);
   for (std::size_t i = 0; i < N; ++i) rotor_[i].log_odds = verdict ? verdict->log_odds[i] : 0.0;
+  note_leader(verdict);
   test_rotors(now);
   test_ambiguity(now, verdict ? verdict->log_odds_faulty : 0.0);
 }
@@ -374,11 +396,14 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
 template <std::size_t N>
 UnbalanceInnovation RotorUnbalanceMonitor<N>::innovation() const noexcept {
   const auto& counters = tracker_.counters();
+  std::array<double, kMaxRotors> speed_error_ratio{};
+  for (std::size_t i = 0; i < N; ++i) speed_error_ratio[i] = tracker_.speed_error_ratio(i);
   return {.nis = nis_,
           .noise_m_s2 = std::sqrt(tracker_.noise_variance_m2_s4()),
           .samples = counters.fused,
           .samples_refused = counters.not_finite + counters.time_backward + counters.speed_unknown,
-          .speeds_refused = counters.speed_refused};
+          .speeds_refused = counters.speed_refused,
+          .speed_error_ratio = speed_error_ratio};
 }
 
 template <std::size_t N>

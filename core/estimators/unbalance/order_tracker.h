@@ -10,6 +10,7 @@
 
 #include "core/estimators/unbalance/rotor_separation.h"
 #include "core/estimators/unbalance/sensor_response.h"
+#include "core/estimators/unbalance/speed_scale.h"
 #include "core/estimators/unbalance/speed_track.h"
 #include "core/estimators/update_status.h"
 #include "core/math/elementary.h"
@@ -25,7 +26,8 @@ struct OrderTrackerParams {
   Scalar smallest_m_s2 = static_cast<Scalar>(0.3);  ///< smallest amplitude to be found: the scale of (5)
   Scalar speed_latency_s = 0;                       ///< from the measurement of a speed to its stamp
   Scalar speed_noise_ratio = static_cast<Scalar>(0.004);  ///< of one report, resolution included, 1σ
-  Scalar low_pass_Hz = 0;  ///< of the accelerometer, Butterworth of second order; 0 = not known
+  Scalar most_speed_error_ratio = 0;  ///< of the clocks that time the turns; 0 = they are taken for exact
+  Scalar low_pass_Hz = 0;             ///< of the accelerometer, Butterworth of second order; 0 = not known
 };
 
 /// Which rotor shakes the vehicle, told by the phase of each: order tracking of the first order of N rotors.
@@ -34,6 +36,7 @@ struct OrderTrackerParams {
 ///   Update     S = hᵀ·P·h + R;  K = P·h/S;  X ← X + K·(a_x − hᵀ·X), Y alike;  P ← P − K·(P·h)ᵀ              (3)
 ///   Rotation   A± = (X ± j·s·Y)/2: the part that turns with the rotor, and the part against it               (4)
 ///   Design     P₀ = (40·smallest)²; q_A = (0.3·smallest)² per s; q_θ = (σ_ω·ω)²·Δt_report + 0.01 per s        (5)
+///   Clocks     ωᵢ = (1 + εᵢ)·reported: SpeedScale, within most_speed_error_ratio
 ///   Noise      R: mean of ½(ν_x² + ν_y²)·max(R/S, 0.1) over 1 s                                             (6)
 ///   Source     our own, derived in docs/equations/order_tracking.md; a relative of Vold and Leuridan's order tracking
 ///              by Kalman filters, causal and with all rotors in one state
@@ -71,9 +74,7 @@ class OrderTracker {
   };
 
   explicit OrderTracker(const OrderTrackerParams<Scalar>& params) noexcept
-      : params_{params},
-        response_{std::min(params.reference_speed_rad_s / Scalar{6}, kMostHighPass_rad_s),
-                  params.low_pass_Hz} {
+      : params_{params}, response_{Scalar{0}, params.low_pass_Hz} {
     forget();
   }
 
@@ -115,6 +116,12 @@ class OrderTracker {
     return counters_.fused > fused_before ? UpdateStatus::kFused : UpdateStatus::kConverging;
   }
 
+  /// What is known of the clock error of a rotor's speed, from earlier flights.
+  void start_speed_error(std::size_t rotor, Scalar ratio) noexcept { scale_[rotor].start_at(ratio); }
+  [[nodiscard]] Scalar speed_error_ratio(std::size_t rotor) const noexcept {
+    return scale_[rotor].error_ratio();
+  }
+
   /// Of the newest sample that was fused.
   [[nodiscard]] const Innovation& innovation() const noexcept { return innovation_; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
@@ -146,7 +153,7 @@ class OrderTracker {
 
  private:
   static constexpr std::size_t kMostWaiting = 128;
-  static constexpr Scalar kMostHighPass_rad_s = 75;
+  static constexpr Scalar kLeastHighPass_rad_s = 30;
   static constexpr Duration kLongestWait{150'000};
   static constexpr Scalar kSpeedUnknown_s = static_cast<Scalar>(0.3);
   static constexpr Scalar kLongestStep_s = static_cast<Scalar>(0.1);
@@ -225,11 +232,24 @@ class OrderTracker {
       is_started_ = true;
       return;
     }
-    dt_mean_s_ = dt_mean_s_ > Scalar{0} ? dt_mean_s_ + static_cast<Scalar>(0.05) * (dt_s - dt_mean_s_) : dt_s;
+    if (dt_mean_s_ <= Scalar{0}) {
+      dt_mean_s_ = dt_s;
+      response_.set_high_pass(high_pass_rad_s(dt_s));
+    }
+    dt_mean_s_ += static_cast<Scalar>(0.05) * (dt_s - dt_mean_s_);
     const auto accel = response_.high_pass(sample.accel_m_s2, dt_s);
     predict(dt_s);
     update(sample, accel, regressor(sample.window_s), dt_s);
     ++counters_.fused;
+  }
+
+  /// Two poles at a third of the hover speed: the vehicle's own motion and the mount's reach 50 Hz. Where slow sampling
+  /// folds the rotor down, at a third of where it comes to lie.
+  [[nodiscard]] Scalar high_pass_rad_s(Scalar dt_s) const noexcept {
+    const Scalar turns = params_.reference_speed_rad_s * dt_s / kTwoPi;
+    const Scalar part = turns - std::floor(turns);
+    const Scalar folded_rad_s = std::min(part, Scalar{1} - part) * kTwoPi / dt_s;
+    return std::max(std::min(params_.reference_speed_rad_s, folded_rad_s) / Scalar{3}, kLeastHighPass_rad_s);
   }
 
   bool read_speeds(const Sample& sample) noexcept {
@@ -237,7 +257,7 @@ class OrderTracker {
     for (std::size_t i = 0; i < N; ++i) {
       const auto value = track_[i].at(middle);
       if (!value || value->spacing_s > kSpeedUnknown_s) return false;
-      speed_[i] = value->speed_rad_s;
+      speed_[i] = (Scalar{1} + scale_[i].error_ratio()) * value->speed_rad_s;
       spacing_s_[i] = value->spacing_s;
     }
     return true;
@@ -299,6 +319,7 @@ class OrderTracker {
     const Scalar nu_x = std::clamp(innovation_.x_m_s2, -most, most);
     const Scalar nu_y = std::clamp(innovation_.y_m_s2, -most, most);
     if (nu_x != innovation_.x_m_s2 || nu_y != innovation_.y_m_s2) ++counters_.cut;
+    if (params_.most_speed_error_ratio > Scalar{0}) learn_scale(Ph, nu_x / S, nu_y / S);
     for (std::size_t i = 0; i < kStates; ++i) {  // (3)
       const Scalar k = Ph[i] / S;
       x_[i] += k * nu_x;
@@ -318,6 +339,19 @@ class OrderTracker {
     return static_cast<Scalar>(0.5) * (x * x + y * y);
   }
 
+  /// SpeedScale (2) for the correction Ph·ν/S that is about to be made.
+  void learn_scale(const Vector& Ph, Scalar x_share, Scalar y_share) noexcept {
+    for (std::size_t i = 0; i < N; ++i) {
+      const std::size_t re = 2 * i;
+      const std::size_t im = re + 1;
+      const Scalar across =
+          x_share * (x_[re] * Ph[im] - x_[im] * Ph[re]) + y_share * (y_[re] * Ph[im] - y_[im] * Ph[re]);
+      const Scalar variance = Scalar{2} * (P(re, re) + P(im, im));
+      const Scalar squared = x_m_s2(i).squared() + y_m_s2(i).squared();
+      scale_[i].learn(across / (squared + Scalar{4} * variance), speed_[i], params_.most_speed_error_ratio);
+    }
+  }
+
   /// (6): at rest where the mean NIS is 2; one sample moves R by a limited factor.
   void learn_noise(Scalar S, Scalar dt_s) noexcept {
     const Scalar share = std::max(R_ / S, static_cast<Scalar>(0.1));
@@ -330,6 +364,7 @@ class OrderTracker {
   OrderTrackerParams<Scalar> params_;
   SensorResponse<Scalar> response_;
   std::array<SpeedTrack<Scalar>, N> track_{};
+  std::array<SpeedScale<Scalar>, N> scale_{};
   std::array<Sample, kMostWaiting> queue_{};
   std::size_t oldest_ = 0;
   std::size_t waiting_ = 0;

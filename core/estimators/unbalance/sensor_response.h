@@ -20,6 +20,8 @@ class SensorResponse {
   SensorResponse(Scalar high_pass_rad_s, Scalar low_pass_Hz) noexcept
       : high_pass_rad_s_{high_pass_rad_s}, low_pass_rad_s_{kTwoPi * low_pass_Hz} {}
 
+  void set_high_pass(Scalar high_pass_rad_s) noexcept { high_pass_rad_s_ = high_pass_rad_s; }
+
   /// The high-passed sample of two axes, (1).
   std::array<Scalar, 2> high_pass(std::array<Scalar, 2> sample, Scalar dt_s) noexcept {
     alpha_ = Scalar{1} / (Scalar{1} + high_pass_rad_s_ * dt_s);

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <complex>
+#include <numbers>
 #include <vector>
 
 namespace airworthy::test {
@@ -41,8 +42,13 @@ class DenseOrderFilter {
       started_ = true;
       return;
     }
-    const double corner = std::min(params_.reference_speed_rad_s / 6.0, 75.0);
-    const double alpha = 1.0 / (1.0 + corner * dt_s);
+    // A third of the hover speed, or of the frequency that sampling folds it to.
+    if (corner_ <= 0.0) {
+      const double turns = params_.reference_speed_rad_s * dt_s / (2.0 * std::numbers::pi);
+      const double folded = std::abs(turns - std::round(turns)) * 2.0 * std::numbers::pi / dt_s;
+      corner_ = std::max(std::min(params_.reference_speed_rad_s, folded) / 3.0, 30.0);
+    }
+    const double alpha = 1.0 / (1.0 + corner_ * dt_s);
     const Eigen::Vector2d first = alpha * (first_ + accel - input_);
     second_ = alpha * (second_ + first - first_);
     first_ = first;
@@ -118,6 +124,7 @@ class DenseOrderFilter {
   Eigen::MatrixXd P;
 
  private:
+  double corner_ = 0.0;
   bool started_ = false;
   double R_ = 0.0;
   Eigen::Vector2d input_ = Eigen::Vector2d::Zero();

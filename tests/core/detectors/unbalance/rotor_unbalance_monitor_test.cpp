@@ -36,6 +36,7 @@ UnbalanceParams params_with_baseline() {
   params.has_baseline = true;
   params.baseline_m_s2 = {0.2, 0.3, 0.1, 0.4};
   params.baseline_sigma_m_s2.fill(0.05);
+  params.most_speed_error_ratio = 0.002;  // as with a calibration
   return params;
 }
 

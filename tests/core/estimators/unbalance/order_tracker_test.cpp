@@ -302,7 +302,7 @@ Drawn draw(unsigned seed, Walk kind) {
     x[i] = {normal(random), normal(random)};
     y[i] = {normal(random), normal(random)};
   }
-  const double alpha = 1.0 / (1.0 + 75.0 * kDt_s);
+  const double alpha = 1.0 / (1.0 + world.hover_rad_s / 3.0 * kDt_s);
   Eigen::Vector2d raw = Eigen::Vector2d::Zero();
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   Eigen::Vector2d behind = Eigen::Vector2d::Zero();
@@ -310,7 +310,7 @@ Drawn draw(unsigned seed, Walk kind) {
   double last = 0.0;
   double lag = 0.0;
   double power = 0.0;
-  SensorResponse<double> response{75.0, 0.0};
+  SensorResponse<double> response{world.hover_rad_s / 3.0, 0.0};
   (void)response.high_pass({0.0, 0.0}, kDt_s);
   for (int k = 0; k < 7000; ++k) {
     std::array<double, kN> speeds;
@@ -425,7 +425,7 @@ TEST(OrderTracker, WhiteNoiseAheadOfTheHighPassLeavesInnovationsCorrelated) {
   flight.lag_sum = flight.power_sum = flight.nis_sum = 0.0;
   flight.samples = 0;
   flight.fly(80.0);
-  const double alpha = 1.0 / (1.0 + 75.0 * 0.002);
+  const double alpha = 1.0 / (1.0 + 500.0 / 3.0 * 0.002);
   std::vector<double> h(400, 0.0);  // impulse response of both stages
   double first = 0.0;
   double second = 0.0;
