@@ -22,7 +22,7 @@ constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the small
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
 constexpr double kLeak = 0.05;             // of another rotor's amplitude, that no sigma knows of
 constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
-constexpr double kMostLoad = 2.5;  // thrust by rotor speeds over weight, and its inverse
+constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
 
 SignalPowerParams power_params(const UnbalanceParams& params) {
   SignalPowerParams power;
@@ -246,11 +246,12 @@ double RotorUnbalanceMonitor<N>::largest_but(std::size_t rotor) const noexcept {
 template <std::size_t N>
 void RotorUnbalanceMonitor<N>::note_leader(
     const std::optional<typename Hypotheses::Verdict>& verdict) noexcept {
+  const double lead = params_.log_lead * (1.0 + 4.0 * params_.against_ratio * params_.against_ratio);
   for (std::size_t i = 0; i < N; ++i) {
     leads_[i] = verdict.has_value();
     for (std::size_t j = 0; j < N && leads_[i]; ++j) {
       if (j == i || is_known_[j]) continue;
-      leads_[i] = verdict->log_likelihood_ratio[i] - verdict->log_likelihood_ratio[j] > params_.log_lead;
+      leads_[i] = verdict->log_likelihood_ratio[i] - verdict->log_likelihood_ratio[j] > lead;
     }
   }
 }

@@ -34,7 +34,9 @@ struct UnbalanceParams {
   double most_speed_error_ratio =
       0.01;               ///< they may be off the above, and are followed in flight; 0 = not followed
   double log_odds = 9.2;  ///< of some rotor being out of balance, to report one that is nobody's: 10 000 to 1
-  double log_lead = 3.0;  ///< of the rotor that is blamed over every other one: 20 to 1
+  /// Of the rotor that is blamed over every other one: 20 to 1. Times 1 + 4·against_ratio², as an airframe that answers
+  /// each rotor with an ellipse of its own is not what the hypotheses think it is (found on the Bebop 2, where it is 1).
+  double log_lead = 3.0;
   double persistence_s = 0.5;      ///< of the growth before it is reported
   double ambiguous_after_s = 5.0;  ///< of an unbalance that is nobody's yet, before it is reported as such
   FaultLifeCycleParams life_cycle{.clear_ratio = 0.5, .clear_after = Duration{10'000'000}};

@@ -142,6 +142,99 @@ TEST(RotorHypotheses, EqualDenseGaussianLikelihoods) {
   }
 }
 
+/// (5) from its words: A₊ of known size along its estimate, A₋ as uncertain as both its parts; a growth along the estimate.
+struct Calibrated {
+  Eigen::Vector4d mean;
+  Eigen::Matrix4d usual;
+  Eigen::Matrix4d grown;
+};
+
+Calibrated calibrated(const Seen& seen, const Prior& prior, std::size_t k, double smallest) {
+  const Phasor<double> estimate = seen.turning_m_s2(k, prior.spin[k]);
+  const Complex u = Complex{estimate.re, estimate.im} / estimate.magnitude();
+  const Complex factor{0.0, -static_cast<double>(prior.spin[k])};
+  const auto seen_of = [&](Complex own, Complex against) {
+    const Complex x = own + against;
+    const Complex y = factor * (own - against);
+    return Eigen::Vector4d{x.real(), x.imag(), y.real(), y.imag()};
+  };
+  const auto covariance = [&](double along, double across, double against) {
+    const Eigen::Vector4d a = seen_of(u, 0.0);
+    const Eigen::Vector4d b = seen_of(u * Complex{0.0, 1.0}, 0.0);
+    const Eigen::Vector4d c = seen_of(0.0, 1.0);
+    const Eigen::Vector4d d = seen_of(0.0, Complex{0.0, 1.0});
+    return Eigen::Matrix4d{along * a * a.transpose() + across * b * b.transpose() +
+                           against * (c * c.transpose() + d * d.transpose())};
+  };
+  const double size = prior.amplitude_m_s2[k];
+  const double sigma2 = prior.sigma_m_s2[k] * prior.sigma_m_s2[k];
+  const double rho2 = prior.against_ratio * prior.against_ratio;
+  const double growth2 = std::pow(std::max(std::abs(estimate.magnitude() - size), smallest), 2);
+  const double across = 0.5 * size * size + sigma2;
+  return {size * seen_of(u, 0.0), covariance(sigma2, across, rho2 * across),
+          covariance(sigma2 + growth2, across, rho2 * across + 0.5 * rho2 * growth2)};
+}
+
+TEST(RotorHypotheses, CalibratedRotorsEqualDenseGaussianLikelihoodsOfTheirGrowth) {
+  std::mt19937 random{19};
+  std::normal_distribution<double> normal;
+  Prior known_sizes = prior();
+  known_sizes.is_calibrated = true;
+  known_sizes.sigma_m_s2 = {0.05, 0.1, 0.07, 0.2};
+  for (int trial = 0; trial < 100; ++trial) {
+    Seen seen;
+    Eigen::MatrixXd root(2 * kN, 2 * kN);
+    for (double& element : root.reshaped()) element = 0.1 * normal(random);
+    seen.P = root * root.transpose() + 1e-4 * Eigen::MatrixXd::Identity(2 * kN, 2 * kN);
+    for (std::size_t i = 0; i < kN; ++i) {
+      seen.x[i] = 0.6 * Complex{normal(random), normal(random)};
+      seen.y[i] = 0.6 * Complex{normal(random), normal(random)};
+    }
+    const auto log_density = [&](std::size_t guilty) {
+      Eigen::MatrixXd C = Eigen::MatrixXd::Zero(4 * kN, 4 * kN);
+      Eigen::VectorXd z(4 * kN);
+      for (std::size_t i = 0; i < kN; ++i) {
+        const auto r = static_cast<Eigen::Index>(i);
+        const Calibrated rotor = calibrated(seen, known_sizes, i, 0.4);
+        for (Eigen::Index c = 0; c < static_cast<Eigen::Index>(kN); ++c) {
+          C.block(4 * r, 4 * c, 2, 2) = seen.P.block(2 * r, 2 * c, 2, 2);
+          C.block(4 * r + 2, 4 * c + 2, 2, 2) = seen.P.block(2 * r, 2 * c, 2, 2);
+        }
+        C.block(4 * r, 4 * r, 4, 4) += i == guilty ? rotor.grown : rotor.usual;
+        z.segment(4 * r, 4) << seen.x[i].real(), seen.x[i].imag(), seen.y[i].real(), seen.y[i].imag();
+        z.segment(4 * r, 4) -= rotor.mean;
+      }
+      const Eigen::LDLT<Eigen::MatrixXd> factor{C};
+      return -0.5 * (z.dot(factor.solve(z)) + factor.vectorD().array().log().sum());
+    };
+    const auto verdict = Hypotheses::test(seen, known_sizes, {}, 0.4);
+    ASSERT_TRUE(verdict.has_value());
+    for (std::size_t i = 0; i < kN; ++i) {
+      const double expected = log_density(i) - log_density(kN);
+      ASSERT_NEAR(verdict->log_likelihood_ratio[i], expected, 1e-8 * (1.0 + std::abs(expected)))
+          << trial << ", " << i;
+    }
+  }
+}
+
+TEST(RotorHypotheses, ARotorThatHasAlwaysShakenIsBlamedForTheSameGrowth) {
+  for (const double baseline : {0.1, 2.0, 8.0}) {
+    Prior known_sizes = prior();
+    known_sizes.is_calibrated = true;
+    known_sizes.amplitude_m_s2 = {0.1, 0.1, baseline, 0.1};
+    known_sizes.sigma_m_s2.fill(0.05);
+    Seen seen;
+    for (std::size_t i = 0; i < kN; ++i) {
+      seen.turn(i, known_sizes.amplitude_m_s2[i] + (i == 2 ? 0.6 : 0.0), known_sizes.spin[i]);
+    }
+    const auto verdict = Hypotheses::test(seen, known_sizes, {}, 0.4);
+    ASSERT_TRUE(verdict.has_value());
+    for (const std::size_t other : {0U, 1U, 3U}) {
+      EXPECT_GT(verdict->log_likelihood_ratio[2] - verdict->log_likelihood_ratio[other], 10.0) << baseline;
+    }
+  }
+}
+
 TEST(RotorHypotheses, NameTheRotorThatShakesMoreAndMore) {
   double before = -1e9;
   for (const double amplitude : {0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0}) {
