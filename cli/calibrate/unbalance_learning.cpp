@@ -37,9 +37,10 @@ struct FlightRecord {
   std::string log;
   std::string vehicle;
   std::vector<RotorRecord> rotors;
-  std::vector<Series> speeds;               ///< reports of each rotor in rev/min, in flight
-  std::vector<Series> commands;             ///< of each rotor, in flight
-  std::array<double, kMaxRotors> powers{};  ///< of the signal-power filter at the end
+  std::vector<Series> speeds;                          ///< reports of each rotor in rev/min, in flight
+  std::vector<Series> commands;                        ///< of each rotor, in flight
+  std::array<double, kMaxRotors> powers{};             ///< of the signal-power filter at the end
+  std::array<double, kMaxRotors> speed_error_ratio{};  ///< at the end
   std::int64_t judgements = 0;
   UnbalanceNotJudged last_reason = UnbalanceNotJudged::kNotFlying;
 
@@ -55,6 +56,7 @@ struct FlightRecord {
 struct Judgement {
   TimePoint time;
   std::array<double, kMaxRotors> powers;
+  std::array<double, kMaxRotors> speed_error_ratio;
   std::vector<RotorUnbalance> rotors;
 };
 
@@ -108,8 +110,10 @@ rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceCo
     auto service = std::make_shared<unbalance::UnbalanceService>(node, config);
     service->observe([&](const UnbalanceMonitor& monitor) {
       if (monitor.state() != DetectorState::kMonitoring) return;
-      judgements.push_back(
-          {monitor.judged_at(), monitor.powers(), {monitor.rotors().begin(), monitor.rotors().end()}});
+      judgements.push_back({monitor.judged_at(),
+                            monitor.powers(),
+                            monitor.innovation().speed_error_ratio,
+                            {monitor.rotors().begin(), monitor.rotors().end()}});
     });
     return service;
   });
@@ -126,6 +130,7 @@ rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceCo
     if (judgement.time >= until) continue;
     keep(judgement, record);
     record.powers = judgement.powers;
+    record.speed_error_ratio = judgement.speed_error_ratio;
   }
   if (judgements.empty()) return record;
   const TimePoint last = std::min(until, judgements.back().time);
@@ -191,6 +196,17 @@ std::optional<double> motor_lag(const std::vector<FlightRecord>& flights) {
   }
   if (lags_s.empty()) return std::nullopt;
   return median(lags_s);
+}
+
+/// Of each rotor, the median over the flights.
+std::array<double, kMaxRotors> speed_errors(const std::vector<FlightRecord>& flights, std::size_t rotors) {
+  std::array<double, kMaxRotors> errors{};
+  for (std::size_t i = 0; i < rotors; ++i) {
+    std::vector<double> found;
+    for (const FlightRecord& flight : flights) found.push_back(flight.speed_error_ratio[i]);
+    errors[i] = median(found);
+  }
+  return errors;
 }
 
 /// All judgements of one rotor in all flights.
@@ -323,6 +339,8 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
   if (const auto noise = speed_noise(*flights)) tuned.monitor.speed_noise_ratio = *noise;
   const auto lag_s = motor_lag(*flights);
   if (lag_s) tuned.monitor.vehicle.motor_time_constant_s = *lag_s;
+  tuned.monitor.speed_error_ratio = speed_errors(*flights, rotors);
+  tuned.monitor.most_speed_error_ratio = unbalance::kCalibratedSpeedError;
   const auto latency = best_latency(logs, tuned, jobs);
   if (!latency) return tl::unexpected<rt::Error>{latency.error()};
   tuned.monitor.speed_latency_s = *latency;
@@ -361,7 +379,8 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
     for (const FlightRecord& flight : *flights) {
       filter_power += flight.powers[i] / static_cast<double>(flights->size());
     }
-    calibration.rotors.push_back({baseline, std::sqrt(variance), filter_power});
+    calibration.rotors.push_back(
+        {baseline, std::sqrt(variance), filter_power, tuned.monitor.speed_error_ratio[i]});
     learned.smallest_growth_m_s2.push_back(config.monitor.smallest_m_s2 +
                                            kSigmas * std::hypot(median(all.sigma_m_s2), std::sqrt(variance)));
     for (const double a : all.amplitude_m_s2) power += a * a;

@@ -33,7 +33,8 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
   for (ConfigTable rotor : root.tables("rotor", {.count = Count{3, kMaxRotors}})) {
     calibration.rotors.push_back({rotor.required<double>("baseline_m_s2", kAmplitude),
                                   rotor.required<double>("baseline_sigma_m_s2", kAmplitude),
-                                  rotor.optional<double>("power", 0.0, Range{-1e6, 1e6})});
+                                  rotor.optional<double>("power", 0.0, Range{-1e6, 1e6}),
+                                  rotor.optional<double>("speed_error_ratio", 0.0, Range{-0.1, 0.1})});
   }
   calibration.hash = file.hash();
   return file.finish(std::move(calibration));
@@ -50,6 +51,7 @@ rt::Expected<UnbalanceParams> with_calibration(UnbalanceParams params, const Cal
                     calibration.accel_low_pass_Hz, params.low_pass_Hz));
   }
   params.has_baseline = true;
+  params.most_speed_error_ratio = kCalibratedSpeedError;
   params.speed_latency_s = calibration.speed_latency_s;
   params.speed_noise_ratio = calibration.speed_noise_ratio;
   params.against_ratio = calibration.against_ratio;
@@ -66,6 +68,7 @@ rt::Expected<UnbalanceParams> with_calibration(UnbalanceParams params, const Cal
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
     params.baseline_m_s2[i] = calibration.rotors[i].baseline_m_s2;
     params.baseline_sigma_m_s2[i] = calibration.rotors[i].baseline_sigma_m_s2;
+    params.speed_error_ratio[i] = calibration.rotors[i].speed_error_ratio;
     params.baseline_power[i] = calibration.rotors[i].power / (ratio * ratio);
   }
   return params;
@@ -91,10 +94,11 @@ std::string to_toml(const Calibration& calibration) {
       calibration.speed_latency_s, calibration.speed_noise_ratio, calibration.motor_time_constant_s,
       calibration.response, calibration.has_trial_mass, calibration.against_ratio);
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
+    const Calibration::Rotor& rotor = calibration.rotors[i];
     text += fmt::format(
-        "\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\npower = {:.6g}\n", i + 1,
-        calibration.rotors[i].baseline_m_s2, calibration.rotors[i].baseline_sigma_m_s2,
-        calibration.rotors[i].power);
+        "\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\npower = {:.6g}\n"
+        "speed_error_ratio = {:.6g}\n",
+        i + 1, rotor.baseline_m_s2, rotor.baseline_sigma_m_s2, rotor.power, rotor.speed_error_ratio);
   }
   return text;
 }

@@ -8,6 +8,9 @@
 
 namespace airworthy::unbalance {
 
+/// How far a clock may drift from what a calibration found, temperature included.
+inline constexpr double kCalibratedSpeedError = 0.002;
+
 /// What healthy flights say about the balance of a vehicle's propellers: the content of a calibration file.
 /// `airworthy calibrate unbalance` writes it, airworthy-unbalance reads it.
 struct Calibration {
@@ -15,6 +18,7 @@ struct Calibration {
     double baseline_m_s2 = 0.0;        ///< amplitude at hover speed, mean over the flights
     double baseline_sigma_m_s2 = 0.0;  ///< of a single judgement around it, between flights included
     double power = 0.0;                ///< of the signal-power filter, (U/U₀)²; 0 = not learned
+    double speed_error_ratio = 0.0;    ///< true over reported speed, less 1
   };
 
   std::string vehicle;

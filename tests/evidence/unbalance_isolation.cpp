@@ -117,6 +117,8 @@ UnbalanceParams calibrated(const Multirotor& vehicle, const Condition& condition
   auto healthy = flown<N>(vehicle, plan(Manoeuvre::kRandom, kCalibration_s, 2.3), realism,
                           Seeds{seed, 100'000 + seed}, params, true);
   params.has_baseline = true;
+  params.speed_error_ratio = healthy.monitor().innovation().speed_error_ratio;
+  params.most_speed_error_ratio = 0.002;
   params.baseline_power = healthy.monitor().powers();
   for (std::size_t i = 0; i < N; ++i) {
     params.baseline_m_s2[i] = healthy.mean_m_s2(i);
