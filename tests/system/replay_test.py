@@ -1,87 +1,27 @@
 #!/usr/bin/python3
 """A flight recorded by lcm-logger gives the same events at the same times: replayed by lcm-logplayer, and in airworthy eval."""
 import csv
-import importlib
 import json
-import pathlib
-import struct
 import subprocess
-import sys
 import time
 
 import system_test
+from recording import events, lost_messages, play_inputs, python_bindings, read_log, record
 from system_test import BINARIES, PROJECT, SystemTest, flights
 
 SPEED = 10.0
 FLIGHTS = ("carbonZ_2018-10-18-11-03-57_engine_failure_with_emr_traj", "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure")
 VEHICLE = "plane1"
-TYPES = {"FAULT_EVENT": "fault_event_t", "DRIVER_STATUS": "driver_status_t", "IMU": "imu_t"}
-
-
-def python_bindings(folder):
-    """Decoders made by lcm-gen: independent of our C++."""
-    subprocess.run(["lcm-gen", "-p", "--ppath", folder, *(PROJECT / "lcmtypes").glob("*.lcm")], check=True)
-    sys.path.insert(0, str(folder))
-    package = importlib.import_module("airworthy")
-    return {channel: getattr(package, name) for channel, name in TYPES.items()}
-
-
-def read_log(path):
-    """Yields (event number, channel, payload) of an LCM log."""
-    data, offset = pathlib.Path(path).read_bytes(), 0
-    while offset + 28 <= len(data):
-        sync, number, _, channel_length, size = struct.unpack(">Iqqii", data[offset:offset + 28])
-        assert sync == 0xEDA1DA01, f"{path}: byte {offset}"
-        offset += 28
-        channel = data[offset:offset + channel_length].decode()
-        offset += channel_length
-        yield number, channel, data[offset:offset + size]
-        offset += size
-
-
-def lost_messages(path):
-    """Numbers missing in the headers of each producer and channel: what sender or logger lost."""
-    last, lost = {}, 0
-    for _, channel, payload in read_log(path):
-        if not channel.startswith(f"{VEHICLE}/"):
-            continue  # LCM's own self test
-        _, _, seq, length = struct.unpack(">qqqi", payload[8:36])
-        producer = payload[36:36 + length]
-        session = struct.unpack(">q", payload[36 + length:44 + length])[0]
-        key = (channel, producer, session)
-        if key in last:
-            lost += seq - last[key] - 1
-        last[key] = seq
-    return lost
-
-
-def events(path, bindings):
-    """What was decided, without who decided it and when it was sent."""
-    decided = []
-    for _, channel, payload in read_log(path):
-        if channel != f"{VEHICLE}/FAULT_EVENT":
-            continue
-        event = bindings["FAULT_EVENT"].decode(payload)
-        decided.append((event.number, event.phase, event.component, event.fault_kind, event.onset_us,
-                        event.detected_us, event.header.time_us, event.magnitude,
-                        tuple((item.name, item.value) for item in event.evidence)))
-    return decided
 
 
 class Replay(SystemTest):
     def setUp(self):
         self.rigs = []
 
-    def record(self, rig, name):
-        log = rig.path / name
-        rig.start("lcm-logger", ["lcm-logger", "--quiet", "--force", f"--lcm-url={rig.lcm_url}", log])
-        time.sleep(0.3)
-        return log
-
     def fly(self, name, driver_overrides=()):
         rig = self.rig(SPEED)
         feed = self.feed(rig)
-        log = self.record(rig, "live.lcm")
+        log = record(rig, "live.lcm")
         self.start_system(rig, feed, driver_overrides)
         flight = rig.start_flight(flights(name)[name], "--start-delay", "1.0")
         while flight.poll() is None:
@@ -95,15 +35,12 @@ class Replay(SystemTest):
     def replay(self, live):
         rig = self.rig(1.0, clock_of_detectors="tick")
         feed = self.feed(rig)
-        log = self.record(rig, "again.lcm")
+        log = record(rig, "again.lcm")
         rig.start_gateway()
         rig.start_response()
         time.sleep(1.0)
         self.assert_alive(rig)
-        inputs = subprocess.run(["/usr/bin/python3", PROJECT / "tools/generate_channels.py", "regex",
-                                 PROJECT / "lcmtypes/channels.toml", "input", VEHICLE],
-                                check=True, capture_output=True, text=True).stdout.strip()
-        player = rig.start("lcm-logplayer", ["lcm-logplayer", "-e", inputs, "-l", rig.lcm_url, live])
+        player = play_inputs(rig, live, VEHICLE)
         while player.poll() is None:
             feed.poll(0.2)
         time.sleep(0.5)
@@ -126,9 +63,9 @@ class Replay(SystemTest):
                 rig, live, _ = self.fly(name)
                 bindings = python_bindings(rig.path)
                 again, feed = self.replay(live)
-                first, second = events(live, bindings), events(again, bindings)
-                print(f"{name}: {len(first)} events; lost on the way to the logger: live {lost_messages(live)}, "
-                      f"replay {lost_messages(again)}")
+                first, second = events(live, bindings, VEHICLE), events(again, bindings, VEHICLE)
+                print(f"{name}: {len(first)} events; lost on the way to the logger: live {lost_messages(live, VEHICLE)}, "
+                      f"replay {lost_messages(again, VEHICLE)}")
                 self.assertGreater(len(first), 0)
                 self.assertEqual(first, second)
                 raised = [(component, kind, onset_us, detected_us)
