@@ -152,9 +152,7 @@ std::vector<Trial> thrown_trials(const RecordedSet& set, const Link& link) {
 std::vector<Trial> bebop_trials(const RecordedSet& set, const Link& link) {
   Trial trial{&set.flights.front(), kBebopHalf_s, params_for(set, link)};
   const UnbalanceFlight healthy = judge_unbalance(set.flights.front(), trial.params, link.telemetry);
-  std::vector<std::array<double, 4>> amplitudes;
-  for (double from_s = kBebopFrom_s + 1.5; from_s < kBebopHalf_s - 0.5; from_s += 1.0)
-    amplitudes.push_back(healthy.rms_amplitude_m_s2(from_s, from_s + 1.0));
+  const auto amplitudes = amplitudes_by_second(healthy, kBebopFrom_s + 1.5, kBebopHalf_s);
   learn_baseline(amplitudes, trial.params);
   if (link.follows_clocks) {
     trial.params.speed_error_ratio = {};

@@ -180,13 +180,15 @@ std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor) const
 }
 
 template <std::size_t N>
+double RotorUnbalanceMonitor<N>::sensor_gain(double speed_rad_s) const noexcept {
+  return SensorResponse<double>{0.0, params_.low_pass_Hz}.of_sensor(speed_rad_s, window_s_).magnitude();
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
-  const double gain = [this] {
-    // What the sensors leave of the vibration at the mean speed; the high-pass is not theirs.
-    double speed = 0.0;
-    for (const double one : tracker_.speed_rad_s()) speed += one / static_cast<double>(N);
-    return SensorResponse<double>{0.0, params_.low_pass_Hz}.of_sensor(speed, window_s_).magnitude();
-  }();
+  double mean_speed = 0.0;
+  for (const double speed : tracker_.speed_rad_s()) mean_speed += speed / static_cast<double>(N);
+  const double gain = sensor_gain(mean_speed);
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];
     rotor.by_power = false;
@@ -321,7 +323,9 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   fused_at_judgement_ = tracker_.counters().fused;
   const bool speeds_fail =
       reason == UnbalanceNotJudged::kSpeedUnknown || reason == UnbalanceNotJudged::kSpeedImplausible;
-  if (speeds_fail && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
+  // Where the sensors leave nothing of the vibration its power is that of the noise.
+  const bool power_is_felt = sensor_gain(hover_speed_rad_s(params_.vehicle)) >= kLeastGain;
+  if (speeds_fail && power_is_felt && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
     state_ = DetectorState::kMonitoring;
     judge_by_power(now, dt_s);
     return;

@@ -54,6 +54,8 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   [[nodiscard]] UnbalanceNotJudged reason_for_all(TimePoint now) const noexcept;
   [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor) const noexcept;
   [[nodiscard]] bool speeds_carry_the_vehicle() const noexcept;
+  /// What the sensors leave of a vibration, 1 = all; the high-pass is not theirs.
+  [[nodiscard]] double sensor_gain(double speed_rad_s) const noexcept;
 
   UnbalanceParams params_;
   Tracker tracker_;
