@@ -318,6 +318,11 @@ void Simulation::drive_motors(const ControlOutput& control) {
   }
 }
 
+void Simulation::send_inertial(double time_s, Output& output) {
+  const ImuSample sample = imu_.sample(time_s, imu_fault());
+  if (!loss_.chance(realism_.imu.dropout_ratio) && link_is_up(Link::kAutopilot)) output.on_imu(sample);
+}
+
 void Simulation::send(Output& output) {
   if (!truth_is_told_) {
     truth_is_told_ = true;
@@ -330,10 +335,6 @@ void Simulation::send(Output& output) {
   }
   const bool autopilot_is_up = link_is_up(Link::kAutopilot);
   const double autopilot_loss = realism_.autopilot.dropout_ratio;
-  if (imu_schedule_.is_due(time_s_)) {
-    const ImuSample sample = imu_.sample(time_s_, imu_fault());
-    if (!loss_.chance(realism_.imu.dropout_ratio) && autopilot_is_up) output.on_imu(sample);
-  }
   if (esc_schedule_.is_due(time_s_))
     esc_.measure(time_s_, kFullSupply_V * sag(), state_.speed_rad_s, esc_faults());
   const bool esc_is_up = link_is_up(Link::kEsc);
@@ -378,6 +379,8 @@ void Simulation::step(Output& output) {
     dynamics_.step(state_, inputs_, kPhysicsStep_s);
     accelerations_ = dynamics_.accelerations(state_, inputs_);
     imu_.step(state_, accelerations_, thrust);
+    const double now_s = time_s_ + static_cast<double>(k + 1) * kPhysicsStep_s;
+    if (imu_schedule_.is_due(now_s)) send_inertial(now_s, output);
   }
   ++steps_;
   time_s_ = static_cast<double>(steps_) * kControlStep_s;

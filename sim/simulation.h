@@ -63,6 +63,8 @@ class Simulation {
   [[nodiscard]] Estimate estimate();
   void drive_motors(const ControlOutput& control);
   void send(Output& output);
+  /// Any rate that divides the physics' is sampled at even steps.
+  void send_inertial(double time_s, Output& output);
   [[nodiscard]] bool link_is_up(Link link) const;
   [[nodiscard]] ImuFault imu_fault() const;
   [[nodiscard]] std::array<EscFault, kMaxRotors> esc_faults() const;

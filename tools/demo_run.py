@@ -1,7 +1,8 @@
 #!/usr/bin/python3
-"""Runs the whole system live: gateway, response detector and MAVLink driver as separate processes, a flight controller on a
-pseudo-terminal, and the view of a ground station in this terminal. The flight controller is that of a simulated hexarotor
-that loses its link for a while and then a propeller, or a recorded flight."""
+"""Runs the whole system live: gateway, detectors and MAVLink driver as separate processes, a flight controller on a
+pseudo-terminal, and the view of a ground station in this terminal. The flight controller is that of a simulated hexarotor,
+which is first calibrated on a healthy flight and then loses its link for a while, a bit of one propeller and all of
+another; or it is a recorded flight."""
 import argparse
 import csv
 import json
@@ -18,6 +19,7 @@ import flight_rig
 DATA = pathlib.Path(os.environ.get("AIRWORTHY_DATA", flight_rig.PROJECT.parent / "shared/data"))
 VEHICLE = "vehicles/unbalance_hexa.toml"
 SCENARIO = "scenarios/demo.toml"
+HEALTHY = "scenarios/healthy_manoeuvres.toml"
 
 
 def arguments():
@@ -89,11 +91,28 @@ def report(feed, rig, flight, speed):
         print("demo: no fault was found in this flight")
 
 
+def calibrated(rig, seed):
+    """Flies the vehicle healthy, in other air, and lets the detectors learn it; returns the file for the unbalance detector."""
+    print("demo: calibrating on a healthy flight")
+    log, calibration = rig.path / "healthy.lcm", rig.path / "unbalance_calibration.toml"
+    steps = ([rig.binaries / "airworthy-sim", "--vehicle", rig.config / VEHICLE, "--scenario", rig.config / HEALTHY,
+              "--vehicle-seed", seed, "--seed", seed + 1000, "--output", log],
+             [rig.binaries / "airworthy-calibrate", "unbalance", "--config", rig.config / "unbalance.toml", "--output",
+              calibration, log])
+    for step in steps:
+        done = subprocess.run([str(part) for part in step], capture_output=True, text=True)
+        if done.returncode != 0:
+            sys.exit(f"{done.stdout}{done.stderr}demo: the vehicle could not be calibrated")
+    return calibration
+
+
 def run(given):
     with flight_rig.Rig(given.binaries, given.speed) as rig:
         check_computer(given.binaries, rig.lcm_url)
         if given.flight is None:
+            calibration = calibrated(rig, given.seed)
             rig.start_gateway(config="demo/gateway.toml")
+            rig.start_service("airworthy-unbalance", "unbalance.toml", [f"calibration={calibration}"])
             rig.start_response([f"vehicle={rig.config / VEHICLE}"], config="response_multirotor.toml")
             rig.start_driver(config="demo/mavlink.toml")
             feed = flight_rig.Feed(rig.endpoint)

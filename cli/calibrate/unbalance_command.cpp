@@ -61,11 +61,17 @@ void print_summary(const LearnedUnbalance& learned, const UnbalanceParams& param
   measured.response = calibration.response;
   const double g_mm = 1e6 * UnbalanceMonitor::kg_m_per_m_s2(measured);
   const double mg = g_mm / params.vehicle.propeller_radius_m;
-  fmt::print("{} flights, {:.0f} s judged; telemetry {:.0f} ms late, noise {:.2f} %; response {:.2f}{}\n",
-             calibration.flights, calibration.judged_s, 1e3 * calibration.speed_latency_s,
-             100.0 * calibration.speed_noise_ratio, calibration.response,
-             calibration.has_trial_mass ? " by trial mass"
-                                        : ", not measured: absolute masses may be off by its error");
+  fmt::print(
+      "{} flights, {:.0f} s judged; telemetry {:.0f} ms late, noise {:.2f} %; motor lag {}; response "
+      "{:.2f}{}\n",
+      calibration.flights, calibration.judged_s, 1e3 * calibration.speed_latency_s,
+      100.0 * calibration.speed_noise_ratio,
+      calibration.motor_time_constant_s > 0.0
+          ? fmt::format("{:.0f} ms", 1e3 * calibration.motor_time_constant_s)
+          : "not learned",
+      calibration.response,
+      calibration.has_trial_mass ? " by trial mass"
+                                 : ", not measured: absolute masses may be off by its error");
   fmt::print("  {:<8} {:>14} {:>12} {:>12} {:>26}\n", "rotor", "baseline m/s^2", "g*mm", "mg at tip",
              "smallest growth seen, mg");
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {

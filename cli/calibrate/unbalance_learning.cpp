@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "cli/calibrate/learning.h"
+#include "cli/calibrate/motor_lag_fit.h"
 #include "cli/eval/flight_run.h"
 #include "runtime/bus/channels.h"
 #include "services/unbalance/unbalance_service.h"
@@ -36,8 +37,9 @@ struct FlightRecord {
   std::string log;
   std::string vehicle;
   std::vector<RotorRecord> rotors;
-  std::vector<std::vector<double>> speed_rpm;  ///< reports of each rotor, in flight
-  std::array<double, kMaxRotors> powers{};     ///< of the signal-power filter at the end
+  std::vector<Series> speeds;               ///< reports of each rotor in rev/min, in flight
+  std::vector<Series> commands;             ///< of each rotor, in flight
+  std::array<double, kMaxRotors> powers{};  ///< of the signal-power filter at the end
   std::int64_t judgements = 0;
   UnbalanceNotJudged last_reason = UnbalanceNotJudged::kNotFlying;
 
@@ -71,14 +73,38 @@ void keep(const Judgement& judgement, FlightRecord& record) {
   }
 }
 
+/// One message of a value per rotor.
+struct Report {
+  TimePoint time;
+  std::vector<double> values;
+};
+
+std::vector<Series> series_of(const std::vector<Report>& reports, std::size_t rotors, TimePoint from,
+                              TimePoint until) {
+  std::vector<Series> series(rotors);
+  for (const Report& report : reports) {
+    if (report.time < from || report.time >= until) continue;
+    for (std::size_t i = 0; i < std::min(rotors, report.values.size()); ++i) {
+      if (!std::isfinite(report.values[i])) continue;
+      series[i].time_s.push_back(to_seconds(report.time.time_since_epoch()));
+      series[i].value.push_back(std::abs(report.values[i]));
+    }
+  }
+  return series;
+}
+
 /// Plays a log through the monitor as configured.
 rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceConfig& config,
                                        bool whole_flight) {
   std::vector<Judgement> judgements;
-  std::vector<std::pair<TimePoint, std::vector<double>>> reports;
+  std::vector<Report> speeds;
+  std::vector<Report> commands;
   const auto flight = eval::run_flight(log, "airworthy-unbalance", [&](rt::Node& node) {
     node.subscribe<esc_status_t>(channel::kEscStatus, [&](const esc_status_t& message) {
-      reports.emplace_back(from_us(message.header.time_us), message.speed_rpm);
+      speeds.push_back({from_us(message.header.time_us), message.speed_rpm});
+    });
+    node.subscribe<rotor_command_t>(channel::kRotorCommand, [&](const rotor_command_t& message) {
+      commands.push_back({from_us(message.header.time_us), message.command_ratio});
     });
     auto service = std::make_shared<unbalance::UnbalanceService>(node, config);
     service->observe([&](const UnbalanceMonitor& monitor) {
@@ -93,20 +119,19 @@ rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceCo
                               ? *flight->truth->onset - kBeforeOnset
                               : TimePoint::max();
   const std::size_t rotors = config.monitor.vehicle.rotor_count;
-  FlightRecord record{log, flight->vehicle, std::vector<RotorRecord>(rotors),
-                      std::vector<std::vector<double>>(rotors)};
+  FlightRecord record;
+  record.log = log;
+  record.vehicle = flight->vehicle;
+  record.rotors.resize(rotors);
   for (const Judgement& judgement : judgements) {
     if (judgement.time >= until) continue;
     keep(judgement, record);
     record.powers = judgement.powers;
   }
-  for (const auto& [time, speeds] : reports) {
-    const bool in_flight = !judgements.empty() && time >= judgements.front().time &&
-                           time <= judgements.back().time && time < until;
-    for (std::size_t i = 0; in_flight && i < std::min(rotors, speeds.size()); ++i) {
-      if (std::isfinite(speeds[i])) record.speed_rpm[i].push_back(std::abs(speeds[i]));
-    }
-  }
+  if (judgements.empty()) return record;
+  const TimePoint last = std::min(until, judgements.back().time);
+  record.speeds = series_of(speeds, rotors, judgements.front().time, last);
+  record.commands = series_of(commands, rotors, judgements.front().time, last);
   return record;
 }
 
@@ -145,7 +170,8 @@ double median(std::vector<double> values) {
 std::optional<double> speed_noise(const std::vector<FlightRecord>& flights) {
   std::vector<double> ratios;
   for (const FlightRecord& flight : flights) {
-    for (const std::vector<double>& speed : flight.speed_rpm) {
+    for (const Series& series : flight.speeds) {
+      const std::vector<double>& speed = series.value;
       std::vector<double> bends;
       for (std::size_t k = 1; k + 1 < speed.size(); ++k) {
         bends.push_back(std::abs(speed[k - 1] - 2.0 * speed[k] + speed[k + 1]));
@@ -155,6 +181,17 @@ std::optional<double> speed_noise(const std::vector<FlightRecord>& flights) {
   }
   if (ratios.empty()) return std::nullopt;
   return std::clamp(median(ratios), kLeastSpeedNoise, kMostSpeedNoise);
+}
+
+/// The median over the flights of those whose commands changed enough.
+std::optional<double> motor_lag(const std::vector<FlightRecord>& flights) {
+  std::vector<double> lags_s;
+  for (const FlightRecord& flight : flights) {
+    if (const auto fit = fit_motor_lag(flight.commands, flight.speeds))
+      lags_s.push_back(fit->time_constant_s);
+  }
+  if (lags_s.empty()) return std::nullopt;
+  return median(lags_s);
 }
 
 /// All judgements of one rotor in all flights.
@@ -285,6 +322,8 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
     return tl::unexpected<rt::Error>{covered.error()};
   }
   if (const auto noise = speed_noise(*flights)) tuned.monitor.speed_noise_ratio = *noise;
+  const auto lag_s = motor_lag(*flights);
+  if (lag_s) tuned.monitor.vehicle.motor_time_constant_s = *lag_s;
   const auto latency = best_latency(logs, tuned, jobs);
   if (!latency) return tl::unexpected<rt::Error>{latency.error()};
   tuned.monitor.speed_latency_s = *latency;
@@ -302,6 +341,11 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
   calibration.speed_latency_s = tuned.monitor.speed_latency_s;
   calibration.speed_noise_ratio = tuned.monitor.speed_noise_ratio;
   calibration.response = config.monitor.response;
+  calibration.motor_time_constant_s = lag_s.value_or(0.0);
+  if (!lag_s) {
+    learned.notes.push_back(
+        "no motor lag: no commands in the logs, or they hardly change; that of the vehicle file is used");
+  }
   for (const FlightRecord& flight : *flights) {
     calibration.judged_s += static_cast<double>(flight.judgements) * to_seconds(UnbalanceMonitor::kPeriod);
   }

@@ -30,6 +30,7 @@ inline constexpr double kLeastJudged_s = 20.0;
 /// before it).
 ///   Latency    of the telemetry: of 0, 4, … 60 ms the one for which the tracked power of all rotors is largest     (1)
 ///   Noise      of a report: 1.4826·median|ωₖ₋₁ − 2ωₖ + ωₖ₊₁|/√6 over the speed                                  (2)
+///   Motor lag  median over the flights of fit_motor_lag(), for the time without rotor speeds
 ///   Baseline   mean amplitude of each rotor; sigma: of single judgements around it, flights pooled              (3)
 ///   Response   a trial mass m at radius r makes response·m·r·ω₀²/M. Two trials, the mass once on either blade of the
 ///              rotor: its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b. One trial: a − b, right

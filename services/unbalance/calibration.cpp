@@ -26,6 +26,7 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
   calibration.accel_low_pass_Hz = root.required<double>("accel_low_pass_Hz", Range{0.0, 1e5});
   calibration.speed_latency_s = root.required<double>("speed_latency_s", Range{0.0, 1.0});
   calibration.speed_noise_ratio = root.required<double>("speed_noise_ratio", Range{0.0, 0.5});
+  calibration.motor_time_constant_s = root.optional<double>("motor_time_constant_s", 0.0, Range{0.0, 1.0});
   calibration.response = root.required<double>("response", Range{1e-3, 1e3});
   calibration.has_trial_mass = root.required<bool>("response_measured");
   calibration.against_ratio = root.required<double>("against_ratio", Range{0.0, 1.0});
@@ -52,6 +53,8 @@ rt::Expected<UnbalanceParams> with_calibration(UnbalanceParams params, const Cal
   params.speed_latency_s = calibration.speed_latency_s;
   params.speed_noise_ratio = calibration.speed_noise_ratio;
   params.against_ratio = calibration.against_ratio;
+  if (calibration.motor_time_constant_s > 0.0)
+    params.vehicle.motor_time_constant_s = calibration.motor_time_constant_s;
   // Thresholds were turned into accelerations with the response assumed before.
   const double ratio = calibration.response / params.response;
   if (params.thresholds_are_masses) {
@@ -80,12 +83,13 @@ std::string to_toml(const Calibration& calibration) {
       "accel_low_pass_Hz = {:.6g}\n"
       "speed_latency_s = {:.6g}            # of the telemetry of the rotor speeds\n"
       "speed_noise_ratio = {:.6g}          # of one report\n"
+      "motor_time_constant_s = {:.6g}     # command to speed; 0 = not learned\n"
       "response = {:.6g}                   # acceleration felt / force over mass, mean of x and y\n"
       "response_measured = {}          # by a flight with a trial mass; false: as the vehicle file assumes\n"
       "against_ratio = {:.6g}              # part of the vibration that turns against the rotor\n",
       calibration.vehicle, calibration.flights, calibration.judged_s, calibration.accel_low_pass_Hz,
-      calibration.speed_latency_s, calibration.speed_noise_ratio, calibration.response,
-      calibration.has_trial_mass, calibration.against_ratio);
+      calibration.speed_latency_s, calibration.speed_noise_ratio, calibration.motor_time_constant_s,
+      calibration.response, calibration.has_trial_mass, calibration.against_ratio);
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
     text += fmt::format(
         "\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\npower = {:.6g}\n", i + 1,

@@ -24,6 +24,7 @@ struct Calibration {
   double accel_low_pass_Hz = 0.0;  ///< that amplitudes were corrected for
   double speed_latency_s = 0.0;
   double speed_noise_ratio = 0.0;
+  double motor_time_constant_s = 0.0;  ///< 0 = not learned
   double response = 1.0;  ///< acceleration felt / force over mass; by a trial mass, else of the vehicle file
   bool has_trial_mass = false;  ///< whether `response` was measured
   double against_ratio = 0.3;

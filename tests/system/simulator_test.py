@@ -19,9 +19,10 @@ class SimulatorTest(SystemTest):
         feed = self.feed(rig)
         rig.start_gateway(config="demo/gateway.toml")
         rig.start_response([f"vehicle={rig.config / 'vehicles/unbalance_hexa.toml'}"], config="response_multirotor.toml")
+        rig.start_service("airworthy-unbalance", "unbalance.toml")
         rig.start_driver(config="demo/mavlink.toml")
         up = feed.wait_for(lambda kind, document: kind == "health" and alive(document) >= {
-            "airworthy-mavlink", "airworthy-response"}, 20)
+            "airworthy-mavlink", "airworthy-response", "airworthy-unbalance"}, 20)
         self.assertIsNotNone(up, f"the system did not come up: {rig.dead()}")
         flight = rig.start_simulation("vehicles/unbalance_hexa.toml", "scenarios/demo.toml", "--duration", 24)
         for phase in ("on_ground", "in_flight"):

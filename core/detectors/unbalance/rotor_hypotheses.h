@@ -25,11 +25,14 @@ struct UnbalancePrior {
 
 /// How likely it is that one certain rotor is out of balance and the others are as usual.
 ///   H₀  z ~ N(0, C),  C = D(b) + P⊕P,  z = (X, Y) of the order tracker, P its covariance               (1)
-///   Hᵢ  as H₀, but rotor i has the amplitude a = max(|Âᵢ|, smallest) instead of bᵢ: C + Eᵢ·Δ·Eᵢᵀ, Δ = D(a) − D(bᵢ)  (2)
+///   Hᵢ  as H₀, but rotor i has the amplitude a, a² = bᵢ² + max(|Âᵢ|, smallest)², instead of bᵢ: C + Eᵢ·Δ·Eᵢᵀ,
+///       Δ = D(a) − D(bᵢ)                                                                               (2)
 ///   ln p(z|Hᵢ)/p(z|H₀) = ½·rᵢᵀ·(Δ⁻¹ + Wᵢᵢ)⁻¹·rᵢ − ½·ln det(I + Δ·Wᵢᵢ),  W = C⁻¹,  r = W·z              (3)
 ///   Prior   D(a) of one rotor: A₊ ~ N(0, a²), A₋ ~ N(0, (ρ·a)²), complex, independent; X = A₊ + A₋,
 ///           Y = −j·s·(A₊ − A₋)                                                                        (4)
 ///   Source  matrix determinant lemma and Woodbury's identity; docs/equations/order_tracking.md
+/// z is taken for the truth plus an error of P. The filter's own prior draws it towards 0 where nothing is known, and
+/// the P of there is so wide that what is lacking does not matter.
 /// Where two rotors turn too alike, P tells so: (3) is then large for both, and neither is likely. The sense of
 /// rotation counts: a vibration that turns clockwise is no rotor's that turns the other way.
 /// Cost: (4N)³ flops once for all hypotheses; no heap.

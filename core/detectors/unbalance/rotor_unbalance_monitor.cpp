@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 namespace airworthy {
@@ -11,15 +12,21 @@ namespace {
 using Transition = FaultLifeCycle::Transition;
 
 constexpr double kGravity_m_s2 = 9.81;
-constexpr double kConverging_s = 1.0;
+constexpr double kConverging_s = 0.5;
 constexpr double kSmoothing_s = 0.5;
 constexpr double kSigmas = 2.0;
-constexpr double kFrozen_s = 1.0;
+constexpr double kFrozen_s = 0.5;  // without a change ...
+constexpr int kFrozenChanges =
+    10;  // while each of the others changed so often, on average: a coarse scale is not frozen
 constexpr double kInertialStale_s = 1.0;
 constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
-constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
-constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
+constexpr double kLeak = 0.05;             // of another rotor's amplitude, that no sigma knows of
+// The growth of a rotor that turns apart by d rad/s leaks through a tracker of this time constant by 1/√(1 + (d·T)²).
+constexpr double kTrackerTime_s = 0.3;
+constexpr double kSpeedsSmoothed_s = 1.0;
+constexpr double kConfounded = 0.5;  // correlation of two rotors' amplitudes
+constexpr double kMostLoad = 2.5;    // thrust by rotor speeds over weight, and its inverse
 
 SignalPowerParams power_params(const UnbalanceParams& params) {
   SignalPowerParams power;
@@ -37,6 +44,12 @@ std::array<double, N> first(const std::array<double, kMaxRotors>& all) {
   std::array<double, N> result{};
   std::copy_n(all.begin(), N, result.begin());
   return result;
+}
+
+template <std::size_t... kIndex>
+std::array<FaultLifeCycle, sizeof...(kIndex)> life_cycles(const FaultLifeCycleParams& params,
+                                                          std::index_sequence<kIndex...>) {
+  return {(static_cast<void>(kIndex), FaultLifeCycle{params})...};
 }
 
 }  // namespace
@@ -59,14 +72,11 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
                 .speed_latency_s = params.speed_latency_s,
                 .speed_noise_ratio = params.speed_noise_ratio,
                 .most_speed_error_ratio = params.most_speed_error_ratio,
+                .high_pass_rad_s = 2.0 * std::numbers::pi * params.high_pass_Hz,
                 .low_pass_Hz = params.low_pass_Hz}},
       fallback_{params.vehicle, power_params(params), first<N>(params.baseline_power)},
-      life_{[&]<std::size_t... kIndex>(std::index_sequence<kIndex...>){return std::array<FaultLifeCycle, N>{
-          (static_cast<void>(kIndex), FaultLifeCycle{params.life_cycle})...};
-}  // namespace airworthy
-(std::make_index_sequence<N>{})
-}
-, ambiguity_life_{params.life_cycle} {
+      life_{life_cycles(params.life_cycle, std::make_index_sequence<N>{})},
+      ambiguity_life_{params.life_cycle} {
   for (std::size_t i = 0; i < N; ++i) {
     tracker_.start_speed_error(i, params.speed_error_ratio[i]);
     prior_.spin[i] = params.vehicle.rotor[i].spin;
@@ -88,8 +98,11 @@ void RotorUnbalanceMonitor<N>::on_speeds(TimePoint time, std::span<const double>
   if (speed_rad_s.size() != N) return;
   for (std::size_t i = 0; i < N; ++i) {
     if (!std::isfinite(speed_rad_s[i])) continue;
-    if (speed_rad_s[i] != last_speed_rad_s_[i]) speed_changed_at_[i] = time;
+    if (speed_rad_s[i] == last_speed_rad_s_[i]) continue;
     last_speed_rad_s_[i] = speed_rad_s[i];
+    speed_changed_at_[i] = time;
+    for (int& changes : changes_of_others_) ++changes;
+    changes_of_others_[i] = 0;
   }
   tracker_.on_speeds(time, std::span<const double, N>{speed_rad_s});
 }
@@ -108,6 +121,7 @@ bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double 
   const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
   if (flies && !is_tracking_) {
     tracker_.forget();
+    estimated_s_ = 0.0;
     power_m2_s4_.fill(0.0);
     against_power_m2_s4_.fill(0.0);
     fallback_.restart();
@@ -151,14 +165,17 @@ UnbalanceNotJudged RotorUnbalanceMonitor<N>::reason_for_all(TimePoint now) const
   const bool fuses = tracker_.counters().fused > fused_at_judgement_;
   if (to_seconds(now - tracking_since_) < kConverging_s) return UnbalanceNotJudged::kConverging;
   if (!fuses) return UnbalanceNotJudged::kSpeedUnknown;
-  const bool is_frozen = std::any_of(speed_changed_at_.begin(), speed_changed_at_.end(),
-                                     [now](TimePoint t) { return to_seconds(now - t) > kFrozen_s; });
+  bool is_frozen = false;
+  for (std::size_t i = 0; i < N; ++i) {
+    is_frozen = is_frozen || (to_seconds(now - speed_changed_at_[i]) > kFrozen_s &&
+                              changes_of_others_[i] > kFrozenChanges * static_cast<int>(N - 1));
+  }
   if (is_frozen || !speeds_carry_the_vehicle()) return UnbalanceNotJudged::kSpeedImplausible;
   return UnbalanceNotJudged::kJudged;
 }
 
 template <std::size_t N>
-std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor) const noexcept {
+std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor, bool is_informed) const noexcept {
   const auto power = [this](std::size_t i, std::size_t j) {
     double sum = 0.0;
     for (std::size_t a = 0; a < 2; ++a) {
@@ -171,8 +188,10 @@ std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor) const
   };
   std::uint32_t mask = 0;
   for (std::size_t j = 0; j < N; ++j) {
-    if (j != rotor &&
-        power(rotor, j) > kConfounded * kConfounded * std::sqrt(power(rotor, rotor) * power(j, j))) {
+    if (j == rotor) continue;
+    const bool correlates =
+        power(rotor, j) > kConfounded * kConfounded * std::sqrt(power(rotor, rotor) * power(j, j));
+    if (!tracker_.are_apart(rotor, j) || (!is_informed && correlates)) {
       mask |= 1U << j;
     }
   }
@@ -181,7 +200,7 @@ std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor) const
 
 template <std::size_t N>
 double RotorUnbalanceMonitor<N>::sensor_gain(double speed_rad_s) const noexcept {
-  return SensorResponse<double>{0.0, params_.low_pass_Hz}.of_sensor(speed_rad_s, window_s_).magnitude();
+  return SensorResponse<double>{0.0, params_.low_pass_Hz}.sensor(speed_rad_s, window_s_).magnitude();
 }
 
 template <std::size_t N>
@@ -189,13 +208,20 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
   double mean_speed = 0.0;
   for (const double speed : tracker_.speed_rad_s()) mean_speed += speed / static_cast<double>(N);
   const double gain = sensor_gain(mean_speed);
+  // A running mean at first, so that the start at zero leaves no trace.
+  estimated_s_ += dt_s;
+  note_speeds(dt_s);
+  // What was seen while the tracker was at a loss must not linger.
+  const double share = tracker_.explains() ? std::min(1.0, dt_s / std::min(estimated_s_, kSmoothing_s)) : 1.0;
   for (std::size_t k = 0; k < N; ++k) {
     RotorUnbalance& rotor = rotor_[k];
     rotor.by_power = false;
     const double variance = tracker_.turning_variance_m2_s4(k);
     const auto smoothed = [&](double& power, int spin) {
-      const double seen = tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance;
-      power += std::min(1.0, dt_s / kSmoothing_s) * (seen - power);
+      // Bounded below, or one moment without any knowledge would hide what is seen after it.
+      const double seen = std::max(tracker_.turning_m_s2(k, spin).squared() - 2.0 * variance,
+                                   -params_.smallest_m_s2 * params_.smallest_m_s2);
+      power += share * (seen - power);
       return std::sqrt(std::max(0.0, power));
     };
     rotor.amplitude_m_s2 = smoothed(power_m2_s4_[k], prior_.spin[k]);
@@ -207,43 +233,55 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
                                   : rotor.sigma_m_s2;
     const bool is_informed = rotor.sigma_m_s2 < kLeastInformation * params_.smallest_m_s2 ||
                              rotor.amplitude_m_s2 > 4.0 * rotor.sigma_m_s2;
-    rotor.confounded_with = is_informed ? 0U : confounded_with(k);
-    rotor.reason = is_informed                   ? UnbalanceNotJudged::kJudged
-                   : gain < kLeastGain           ? UnbalanceNotJudged::kUnfitInertialData
-                   : rotor.confounded_with != 0U ? UnbalanceNotJudged::kConfounded
-                                                 : UnbalanceNotJudged::kConverging;
+    rotor.confounded_with = confounded_with(k, is_informed);
+    rotor.reason = is_informed && rotor.confounded_with == 0U ? UnbalanceNotJudged::kJudged
+                   : !is_informed && gain < kLeastGain        ? UnbalanceNotJudged::kUnfitInertialData
+                   : rotor.confounded_with != 0U              ? UnbalanceNotJudged::kConfounded
+                                                              : UnbalanceNotJudged::kConverging;
   }
 }
 
 template <std::size_t N>
-void RotorUnbalanceMonitor<N>::note_leader(
-    const std::optional<typename Hypotheses::Verdict>& verdict) noexcept {
+double RotorUnbalanceMonitor<N>::leaked_m_s2(std::size_t rotor) const noexcept {
+  double most = 0.0;
+  for (std::size_t j = 0; j < N; ++j) {
+    if (j == rotor) continue;
+    const double apart2 = apart2_rad2_s2_[rotor][j] * kTrackerTime_s * kTrackerTime_s;
+    const double grown = std::abs(rotor_[j].growth_m_s2) / std::sqrt(1.0 + apart2);
+    most = std::max({most, kLeak * rotor_[j].amplitude_m_s2, grown});
+  }
+  return most;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::note_speeds(double dt_s) noexcept {
+  const auto& speed = tracker_.speed_rad_s();
+  const double share = std::min(1.0, dt_s / std::min(estimated_s_, kSpeedsSmoothed_s));
   for (std::size_t i = 0; i < N; ++i) {
-    leads_[i] = verdict.has_value();
-    for (std::size_t j = 0; j < N && leads_[i]; ++j) {
-      if (j == i || is_known_[j]) continue;
-      leads_[i] = verdict->log_likelihood_ratio[i] - verdict->log_likelihood_ratio[j] > params_.log_lead;
+    for (std::size_t j = 0; j < N; ++j) {
+      const double apart = speed[i] - speed[j];
+      apart2_rad2_s2_[i][j] += share * (apart * apart - apart2_rad2_s2_[i][j]);
     }
   }
 }
 
 template <std::size_t N>
 void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
-  somebody_has_grown_ = false;
   for (std::size_t i = 0; i < N; ++i) {
     RotorUnbalance& rotor = rotor_[i];
     const double doubt = kSigmas * rotor.growth_sigma_m_s2;
+    const double surely_grown = rotor.growth_m_s2 - doubt - leaked_m_s2(i);
     // A usual unbalance that nobody has measured is no growth.
     const double least =
         params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
-    const bool has_grown = !is_known_[i] && rotor.growth_m_s2 - doubt > least;
-    somebody_has_grown_ = somebody_has_grown_ || (has_grown && !leads_[i]);
-    grown_[i].step(has_grown && leads_[i], now);
+    const bool is_judged = rotor.reason == UnbalanceNotJudged::kJudged;
+    grown_[i].step(!is_known_[i] && is_judged && tracker_.explains() && surely_grown > least, now);
     if (is_known_[i]) {
-      rotor.test_ratio = (rotor.growth_m_s2 + doubt) / least;
+      // What was found stays found while another rotor might take its place.
+      rotor.test_ratio = is_judged ? (rotor.growth_m_s2 + doubt) / least : 1.0;
     } else {
-      rotor.test_ratio = std::min((rotor.growth_m_s2 - doubt) / least,
-                                  grown_[i].for_s(params_.persistence_s, now) ? 1e9 : 0.999);
+      rotor.test_ratio =
+          std::min(surely_grown / least, grown_[i].for_s(params_.persistence_s, now) ? 1e9 : 0.999);
       if (rotor.test_ratio >= 1.0) rotor.onset = grown_[i].since;
     }
     rotor.transition = life_[i].step(rotor.test_ratio, now);
@@ -252,22 +290,38 @@ void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
 }
 
 template <std::size_t N>
-void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_faulty) noexcept {
-  double most = 0.0;
-  double most_growth = 0.0;
-  for (const RotorUnbalance& rotor : rotor_) {
-    most = std::max(most, rotor.log_odds);
-    most_growth = std::max(most_growth, rotor.growth_m_s2);
+double RotorUnbalanceMonitor<N>::shared_growth_m_s2(std::size_t rotor) const noexcept {
+  // The filter deals out evenly what rotors share, so that it is the sum of their parts.
+  double sum = 0.0;
+  for (std::size_t j = 0; j < N; ++j) {
+    const bool shares = j == rotor || (rotor_[rotor].confounded_with >> j & 1U) != 0U;
+    if (!shares) continue;
+    if (is_known_[j]) return 0.0;  // it may all be of the one that is known
+    sum += tracker_.turning_m_s2(j, prior_.spin[j]).magnitude();
+    if (params_.has_baseline) sum -= params_.baseline_m_s2[j];
   }
-  const bool is_nobodys = (log_odds_faulty > params_.log_odds && most < params_.log_odds &&
-                           most_growth > params_.smallest_m_s2) ||
-                          (somebody_has_grown_ && std::none_of(is_known_.begin(), is_known_.end(),
-                                                               [](bool known) { return known; }));
+  return sum;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_faulty) noexcept {
+  bool is_pinned = false;
+  double most_growth = 0.0;
+  std::uint32_t suspects = 0;
+  for (std::size_t i = 0; i < N; ++i) {
+    if (is_known_[i]) continue;
+    const RotorUnbalance& rotor = rotor_[i];
+    is_pinned = is_pinned || (rotor.log_odds >= params_.log_odds && rotor.confounded_with == 0U);
+    most_growth = std::max(most_growth, shared_growth_m_s2(i));
+    if (rotor.log_odds > -params_.log_odds) suspects |= 1U << i;
+  }
+  const bool is_nobodys =
+      log_odds_faulty > params_.log_odds && !is_pinned && most_growth > params_.smallest_m_s2;
   ambiguous_.step(is_nobodys, now);
   if (is_nobodys && !ambiguity_life_.active()) {
-    candidates_ = 0;
+    candidates_ = suspects;
     for (std::size_t i = 0; i < N; ++i) {
-      if (rotor_[i].log_odds > -params_.log_odds) candidates_ |= 1U << i;
+      if ((suspects >> i & 1U) != 0U) candidates_ |= rotor_[i].confounded_with;
     }
     ambiguous_since_ = ambiguous_.since;
   }
@@ -340,7 +394,6 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   estimate(dt_s);
   const auto verdict = Hypotheses::test(tracker_, prior_, is_known_, params_.smallest_m_s2);
   for (std::size_t i = 0; i < N; ++i) rotor_[i].log_odds = verdict ? verdict->log_odds[i] : 0.0;
-  note_leader(verdict);
   test_rotors(now);
   test_ambiguity(now, verdict ? verdict->log_odds_faulty : 0.0);
 }

@@ -47,12 +47,16 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   void judge(TimePoint now) noexcept;
   void estimate(double dt_s) noexcept;
   void test_rotors(TimePoint now) noexcept;
-  void note_leader(const std::optional<typename Hypotheses::Verdict>& verdict) noexcept;
+  void note_speeds(double dt_s) noexcept;
   void test_ambiguity(TimePoint now, double log_odds_faulty) noexcept;
   void judge_by_power(TimePoint now, double dt_s) noexcept;
   void mute(UnbalanceNotJudged reason, TimePoint now) noexcept;
   [[nodiscard]] UnbalanceNotJudged reason_for_all(TimePoint now) const noexcept;
-  [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor) const noexcept;
+  [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor, bool is_informed) const noexcept;
+  /// The most that another rotor's amplitude may add to this one's.
+  [[nodiscard]] double leaked_m_s2(std::size_t rotor) const noexcept;
+  /// Growth of a rotor together with those it cannot be told from.
+  [[nodiscard]] double shared_growth_m_s2(std::size_t rotor) const noexcept;
   [[nodiscard]] bool speeds_carry_the_vehicle() const noexcept;
   /// What the sensors leave of a vibration, 1 = all; the high-pass is not theirs.
   [[nodiscard]] double sensor_gain(double speed_rad_s) const noexcept;
@@ -64,10 +68,10 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   std::array<RotorUnbalance, N> rotor_{};
   std::array<double, N> power_m2_s4_{};  ///< smoothed |A₊|² less its variance
   std::array<double, N> against_power_m2_s4_{};
+  double estimated_s_ = 0.0;
   std::array<FaultLifeCycle, N> life_;
   std::array<Held, N> grown_{};
-  std::array<bool, N> leads_{};      ///< explains what is felt better than any other rotor, by log_lead
-  bool somebody_has_grown_ = false;  ///< that does not lead
+  std::array<std::array<double, N>, N> apart2_rad2_s2_{};  ///< mean square difference of speeds
   std::array<bool, N> is_known_{};
   FaultLifeCycle ambiguity_life_;
   FaultLifeCycle::Transition ambiguity_ = FaultLifeCycle::Transition::kNone;
@@ -88,6 +92,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   std::int64_t fused_at_judgement_ = 0;
   std::array<double, N> last_speed_rad_s_{};
   std::array<TimePoint, N> speed_changed_at_{};
+  std::array<int, N> changes_of_others_{};  ///< reports that changed since this rotor's last did
 };
 
 extern template class RotorUnbalanceMonitor<3>;

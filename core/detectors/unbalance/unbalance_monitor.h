@@ -27,15 +27,16 @@ struct UnbalanceParams {
   double response = 1.0;       ///< acceleration felt / force over mass, mean of x and y, near the rotor speed
   double against_ratio = 0.3;  ///< part of the vibration that turns against the rotor, of an uneven airframe
   double low_pass_Hz = 0.0;    ///< of the accelerometer; 0 = not known
+  double high_pass_Hz =
+      0.0;  ///< of the tracker, against motion far below the rotors; 0 = a sixth of hover, at most 12
   double speed_latency_s = 0.0;  ///< of the telemetry
   double speed_noise_ratio = 0.004;
   /// True over reported speed, less 1: motor controllers have clocks of their own.
   std::array<double, kMaxRotors> speed_error_ratio{};
   double most_speed_error_ratio =
-      0.01;                    ///< they may be off the above, and are followed in flight; 0 = not followed
-  double log_odds = 9.2;       ///< of one certain rotor against everything else, to blame it: 10 000 to 1
-  double log_lead = 3.0;       ///< of the rotor that is blamed over every other one: 20 to 1
-  double persistence_s = 0.5;  ///< of the growth before it is reported
+      0.01;               ///< they may be off the above, and are followed in flight; 0 = not followed
+  double log_odds = 9.2;  ///< of some rotor being out of balance, to report one that is nobody's: 10 000 to 1
+  double persistence_s = 0.5;      ///< of the growth before it is reported
   double ambiguous_after_s = 5.0;  ///< of an unbalance that is nobody's yet, before it is reported as such
   FaultLifeCycleParams life_cycle{.clear_ratio = 0.5, .clear_after = Duration{10'000'000}};
 };
@@ -82,9 +83,8 @@ struct UnbalanceInnovation {
 /// speeds of the rotors it falls back to the signal-power filter, core/detectors/unbalance/power_fallback.h.
 ///
 /// A rotor is reported when, for `persistence_s`, its growth over the baseline exceeds `smallest_m_s2` by two sigma
-/// and it explains what is felt better than any other rotor would, by `log_lead`: where two turn too alike the growth of
-/// one shows in the other's amplitude too. What is out of balance but cannot be pinned on one
-/// rotor for `ambiguous_after_s` is reported as such, with the candidates. Judged in flight only.
+/// while it is told apart from every other rotor; the sigma holds all that the rotors share. What is out of balance by
+/// `log_odds` but nobody's for `ambiguous_after_s` is reported as such, with the candidates. Judged in flight only.
 class UnbalanceMonitor {
  public:
   static constexpr Duration kPeriod{100'000};  ///< of judging

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "core/estimators/unbalance/rotor_separation.h"
 #include "core/estimators/unbalance/sensor_response.h"
 #include "core/estimators/unbalance/speed_scale.h"
 #include "core/estimators/unbalance/speed_track.h"
@@ -26,23 +27,26 @@ struct OrderTrackerParams {
   Scalar speed_latency_s = 0;                       ///< from the measurement of a speed to its stamp
   Scalar speed_noise_ratio = static_cast<Scalar>(0.004);  ///< of one report, resolution included, 1σ
   Scalar most_speed_error_ratio = 0;  ///< of the clocks that time the turns; 0 = they are taken for exact
+  Scalar high_pass_rad_s = 0;         ///< two poles; 0 = a sixth of ω₀, at most 75
   Scalar low_pass_Hz = 0;             ///< of the accelerometer, Butterworth of second order; 0 = not known
 };
 
 /// Which rotor shakes the vehicle, told by the phase of each: order tracking of the first order of N rotors.
 ///   Model      a_x(t) = Σᵢ (ωᵢ/ω₀)²·Re[Xᵢ·G(jωᵢ)·e^{jθᵢ}] + v,  a_y with Yᵢ alike,  θᵢ = ∫ωᵢ dt             (1)
-///   Prediction Xᵢ, Yᵢ: random walks; per second and real part  q_A + ½·q_θ·½(|Xᵢ|² + |Yᵢ|²)               (2)
+///   Prediction Xᵢ, Yᵢ: random walks; per second and real part  q_A + ½·q_θ·½·E(|Xᵢ|² + |Yᵢ|²), up to P₀     (2)
 ///   Update     S = hᵀ·P·h + R;  K = P·h/S;  X ← X + K·(a_x − hᵀ·X), Y alike;  P ← P − K·(P·h)ᵀ              (3)
 ///   Rotation   A± = (X ± j·s·Y)/2: the part that turns with the rotor, and the part against it               (4)
-///   Design     P₀ = (4·smallest)²; q_A = (0.3·smallest)² per s; q_θ = (σ_ω·ω)²·Δt_report + 0.01 per s        (5)
+///   Design     P₀ = (40·smallest)²; q_A = (0.3·smallest)² per s; q_θ = (σ_ω·ω)²·Δt_report + 0.01 per s        (5)
 ///   Clocks     ωᵢ = (1 + εᵢ)·reported: SpeedScale, within most_speed_error_ratio
-///   Noise      R: mean of ½(ν_x² + ν_y²) − hᵀ·P·h over 1 s                                                  (6)
+///   Noise      R: mean of ½(ν_x² + ν_y²)·max(R/S, 0.1) over 1 s                                             (6)
 ///   Source     our own, derived in docs/equations/order_tracking.md; a relative of Vold and Leuridan's order tracking
 ///              by Kalman filters, causal and with all rotors in one state
 ///   Symbols    Xᵢ, Yᵢ → x_, y_ [m/s² at ω₀, real and imaginary part]; P → P_, one for both axes, as they share h
 ///              and R; θᵢ → phase_ [rad]; s = +1 clockwise seen from above; G → SensorResponse
 ///   Deviations innovations beyond 4σ are cut there (impacts); samples wait until every rotor's speed is known on
-///              both sides of their time, at most 0.15 s
+///              both sides of their time, at most 0.15 s; a gap in the samples or the speeds that breaks the phases
+///              forgets the amplitudes; a mean NIS above 10 over 0.2 s (a propeller chips) sets P to P₀, once a second
+///              at most; which rotors P may be trusted to tell apart is RotorSeparation's to say
 ///   Frames     body, x forward, y right; specific force, m/s²
 ///   Valid for  Δt in [0.5 ms, 0.1 s]; N in 3 … 8; speeds reported at ≥ 4 Hz; cost: 6·(2N)² + 60·N flops, no heap
 template <class Scalar, std::size_t N>
@@ -67,20 +71,22 @@ class OrderTracker {
     std::int64_t speed_refused = 0;  ///< a report older than the one before it
     std::int64_t speed_unknown = 0;  ///< samples without the speed of every rotor
     std::int64_t cut = 0;            ///< innovations beyond 4σ
+    std::int64_t reopened = 0;       ///< sudden changes
   };
 
   explicit OrderTracker(const OrderTrackerParams<Scalar>& params) noexcept
       : params_{params},
-        // Two poles at a third of the hover speed: the vehicle's own motion and the mount's reach 50 Hz.
-        response_{params.reference_speed_rad_s / Scalar{3}, params.low_pass_Hz} {
+        response_{params.high_pass_rad_s > Scalar{0}
+                      ? params.high_pass_rad_s
+                      : std::min(params.reference_speed_rad_s / Scalar{6}, kMostHighPass_rad_s),
+                  params.low_pass_Hz} {
     forget();
   }
 
   /// Amplitudes as before the first sample; speeds and phases go on.
   void forget() noexcept {
-    const Scalar sigma = Scalar{4} * params_.smallest_m_s2;  // (5)
-    for (auto& row : P_) row.fill(0);
-    for (std::size_t i = 0; i < kStates; ++i) P(i, i) = sigma * sigma;
+    reopen();
+    separation_.reset();
     x_.fill(0);
     y_.fill(0);
   }
@@ -95,9 +101,10 @@ class OrderTracker {
   }
 
   /// A sample of the accelerometer, stamped with the end of its average over `window_s` (0 = raw).
-  /// kConverging: it waits for the speeds at its time; every sample that no longer waits is fused.
+  /// kNotFinite also for a negative window. kConverging: it waits for the speeds at its time; every sample that no longer waits is fused.
   UpdateStatus on_accel(TimePoint time, Scalar a_x_m_s2, Scalar a_y_m_s2, Scalar window_s) noexcept {
-    if (!std::isfinite(a_x_m_s2) || !std::isfinite(a_y_m_s2) || !std::isfinite(window_s)) {
+    const bool has_window = std::isfinite(window_s) && window_s >= Scalar{0};
+    if (!std::isfinite(a_x_m_s2) || !std::isfinite(a_y_m_s2) || !has_window) {
       ++counters_.not_finite;
       return UpdateStatus::kNotFinite;
     }
@@ -140,16 +147,27 @@ class OrderTracker {
     const Scalar im = covariance_m2_s4(2 * rotor + 1, 2 * rotor + 1);
     return static_cast<Scalar>(0.25) * (re + im);
   }
+  /// Whether two rotors have turned differently enough of late for P to be believed between them.
+  [[nodiscard]] bool are_apart(std::size_t i, std::size_t j) const noexcept {
+    return separation_.are_apart(i, j);
+  }
+  /// Whether the model explains what was felt in the last 0.2 s: not in a sudden change, nor before R is learned.
+  [[nodiscard]] bool explains() const noexcept { return change_nis_ < kExplainedNis; }
   /// The speed of each rotor at the newest fused sample. rad/s.
   [[nodiscard]] const std::array<Scalar, N>& speed_rad_s() const noexcept { return speed_; }
 
  private:
   static constexpr std::size_t kMostWaiting = 128;
   static constexpr Duration kLongestWait{150'000};
+  static constexpr Scalar kMostHighPass_rad_s = 75;
   static constexpr Scalar kSpeedUnknown_s = static_cast<Scalar>(0.3);
   static constexpr Scalar kLongestStep_s = static_cast<Scalar>(0.1);
   static constexpr Scalar kMostSigmas = 4;
   static constexpr Scalar kNoiseTime_s = 1;
+  static constexpr Scalar kChangeTime_s = static_cast<Scalar>(0.2);
+  static constexpr Scalar kChangeNis = 10;
+  static constexpr Scalar kExplainedNis = 4;
+  static constexpr Scalar kChangeRest_s = 1;
   static constexpr Scalar kPhaseWalk_rad2_s = static_cast<Scalar>(0.01);
   static constexpr Scalar kTwoPi = static_cast<Scalar>(6.283185307179586);
 
@@ -161,8 +179,31 @@ class OrderTracker {
   };
 
   [[nodiscard]] Scalar& P(std::size_t i, std::size_t j) noexcept { return P_[i][j]; }
+  /// (5): wide beside any amplitude, or what two rotors share would seem to be known of each.
+  [[nodiscard]] Scalar prior_variance_m2_s4() const noexcept {
+    const Scalar sigma = Scalar{40} * params_.smallest_m_s2;
+    return sigma * sigma;
+  }
   static Phasor<Scalar> state(const Vector& v, std::size_t rotor) noexcept {
     return {v[2 * rotor], v[2 * rotor + 1]};
+  }
+
+  void reopen() noexcept {
+    for (auto& row : P_) row.fill(0);
+    for (std::size_t i = 0; i < kStates; ++i) P(i, i) = prior_variance_m2_s4();
+    change_nis_ = 2;
+    since_reopened_s_ = 0;
+  }
+
+  /// What the walk of (2) cannot follow: without it the cut would let the amplitudes creep, the noise swell, and
+  /// another rotor take the share that the right one lacks. Values are cut as innovations are: an impact is no change.
+  void watch_for_change(Scalar dt_s) noexcept {
+    const Scalar nis = std::min(innovation_.nis(), Scalar{2} * kMostSigmas * kMostSigmas);
+    change_nis_ += dt_s / (kChangeTime_s + dt_s) * (nis - change_nis_);
+    since_reopened_s_ += dt_s;
+    if (change_nis_ < kChangeNis || since_reopened_s_ < kChangeRest_s) return;
+    reopen();
+    ++counters_.reopened;
   }
 
   [[nodiscard]] bool need_not_wait(TimePoint time) const noexcept {
@@ -190,6 +231,7 @@ class OrderTracker {
     }
     fused_at_ = sample.time;
     if (!continues) {
+      if (is_started_) forget();
       response_.restart(sample.accel_m_s2);
       last_speed_ = speed_;
       is_started_ = true;
@@ -220,13 +262,17 @@ class OrderTracker {
       phase += static_cast<Scalar>(0.5) * (speed_[i] + last_speed_[i]) * dt_s;
       phase -= kTwoPi * std::floor(phase / kTwoPi);
       const Scalar speed_sigma = params_.speed_noise_ratio * speed_[i];
-      const Scalar q_phase = kPhaseWalk_rad2_s + speed_sigma * speed_sigma * spacing_s_[i];  // (5)
-      const Scalar squared = x_m_s2(i).squared() + y_m_s2(i).squared();
-      const Scalar q =
-          dt_s * (amplitude_walk * amplitude_walk + static_cast<Scalar>(0.25) * q_phase * squared);
-      P(2 * i, 2 * i) += q;  // (2)
-      P(2 * i + 1, 2 * i + 1) += q;
+      phase_walk_rad2_s_[i] = kPhaseWalk_rad2_s + speed_sigma * speed_sigma * spacing_s_[i];  // (5)
+      // E|X|² = |X|² + trace: what is not known of an amplitude turns with the phase too.
+      const Scalar squared =
+          x_m_s2(i).squared() + y_m_s2(i).squared() + Scalar{2} * (P(2 * i, 2 * i) + P(2 * i + 1, 2 * i + 1));
+      const Scalar q = dt_s * (amplitude_walk * amplitude_walk +
+                               static_cast<Scalar>(0.25) * phase_walk_rad2_s_[i] * squared);
+      for (std::size_t part = 2 * i; part < 2 * i + 2; ++part) {  // (2)
+        P(part, part) = std::max(P(part, part), std::min(P(part, part) + q, prior_variance_m2_s4()));
+      }
     }
+    separation_.step(speed_, phase_walk_rad2_s_, dt_s);
     last_speed_ = speed_;
   }
 
@@ -258,7 +304,7 @@ class OrderTracker {
       innovation_.x_m_s2 -= h[i] * x_[i];
       innovation_.y_m_s2 -= h[i] * y_[i];
     }
-    learn_noise(hPh, dt_s);
+    if (R_ <= Scalar{0}) R_ = std::max(power(), params_.smallest_m_s2 * params_.smallest_m_s2);
     const Scalar S = hPh + R_;
     innovation_.variance_m2_s4 = S;
     const Scalar most = kMostSigmas * std::sqrt(S);
@@ -275,6 +321,8 @@ class OrderTracker {
         P(j, i) = P(i, j);
       }
     }
+    learn_noise(S, dt_s);
+    watch_for_change(dt_s);
   }
 
   /// SpeedScale (2) for the correction Ph·ν/S that is about to be made.
@@ -290,12 +338,16 @@ class OrderTracker {
     }
   }
 
-  /// (6), from the innovation before this sample is fused; one sample moves R by a limited factor.
-  void learn_noise(Scalar hPh, Scalar dt_s) noexcept {
-    const Scalar power = static_cast<Scalar>(0.5) *
-                         (innovation_.x_m_s2 * innovation_.x_m_s2 + innovation_.y_m_s2 * innovation_.y_m_s2);
-    if (R_ <= Scalar{0}) R_ = std::max(power, params_.smallest_m_s2 * params_.smallest_m_s2);
-    const Scalar observed = std::clamp(power - hPh, static_cast<Scalar>(0.1) * power, Scalar{10} * R_);
+  [[nodiscard]] Scalar power() const noexcept {
+    const Scalar x = innovation_.x_m_s2;
+    const Scalar y = innovation_.y_m_s2;
+    return static_cast<Scalar>(0.5) * (x * x + y * y);
+  }
+
+  /// (6): at rest where the mean NIS is 2; one sample moves R by a limited factor.
+  void learn_noise(Scalar S, Scalar dt_s) noexcept {
+    const Scalar share = std::max(R_ / S, static_cast<Scalar>(0.1));
+    const Scalar observed = std::min(share * power(), Scalar{10} * R_);
     R_ += dt_s / (kNoiseTime_s + dt_s) * (observed - R_);
     const Scalar least = static_cast<Scalar>(0.01) * params_.smallest_m_s2;
     R_ = std::max(R_, least * least);
@@ -318,10 +370,14 @@ class OrderTracker {
   std::array<Scalar, N> last_speed_{};
   std::array<Scalar, N> spacing_s_{};
   std::array<Scalar, N> phase_{};
+  std::array<Scalar, N> phase_walk_rad2_s_{};
+  RotorSeparation<Scalar, N> separation_;
   std::array<Vector, kStates> P_{};
   Vector x_{};
   Vector y_{};
   Scalar R_ = 0;
+  Scalar change_nis_ = 2;
+  Scalar since_reopened_s_ = 0;
   Innovation innovation_;
   Counters counters_;
 };

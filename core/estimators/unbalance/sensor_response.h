@@ -11,7 +11,8 @@ namespace airworthy {
 ///   High-pass   twice yₖ = α·(yₖ₋₁ + uₖ − uₖ₋₁), α = 1/(1 + ω_c·Δt), so H = (α·(1 − z⁻¹)/(1 − α·z⁻¹))², z = e^{jωΔt}  (1)
 ///   Low-pass    of the sensor, Butterworth of second order: 1/(1 − x² + j·√2·x), x = ω/ω_lp                    (2)
 ///   Average     over the window T, seen from its middle: sin(ωT/2)/(ωT/2)                                      (3)
-/// (1) is exact for what is sampled, beyond half the sampling rate too; (2) is exact below half of it.
+/// (1) is exact at a steady rate of sampling, beyond half of it too; (2) and (3) act ahead of the sampling, so they
+/// are exact at any speed for an analogue filter.
 template <class Scalar>
 class SensorResponse {
  public:
@@ -44,11 +45,11 @@ class SensorResponse {
     const SinCos<Scalar> z = sincos(speed_rad_s * dt_s);
     const Phasor<Scalar> step{Scalar{1} - z.cos, z.sin};
     const Phasor<Scalar> once = alpha_ * step / Phasor<Scalar>{Scalar{1} - alpha_ * z.cos, alpha_ * z.sin};
-    return once * once * of_sensor(speed_rad_s, window_s);
+    return once * once * sensor(speed_rad_s, window_s);
   }
 
-  /// (2)·(3): what the sensor leaves, before anything is sampled.
-  [[nodiscard]] Phasor<Scalar> of_sensor(Scalar speed_rad_s, Scalar window_s) const noexcept {
+  /// (2)·(3): what the sensor leaves of a vibration.
+  [[nodiscard]] Phasor<Scalar> sensor(Scalar speed_rad_s, Scalar window_s) const noexcept {
     Phasor<Scalar> gain{1, 0};
     if (low_pass_rad_s_ > Scalar{0}) {
       const Scalar x = speed_rad_s / low_pass_rad_s_;

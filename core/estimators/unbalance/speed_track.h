@@ -33,14 +33,16 @@ class SpeedTrack {
 
   struct Value {
     Scalar speed_rad_s;
-    Scalar spacing_s;  ///< between the reports around it; the age of the newest one beyond it
+    Scalar
+        spacing_s;  ///< between the reports around it; beyond the newest, its age if that is more than the last spacing
   };
 
   /// The speed at `time`, held before the oldest and beyond the newest report. Empty without any report.
   [[nodiscard]] std::optional<Value> at(TimePoint time) const noexcept {
     if (count_ == 0) return std::nullopt;
-    if (time > newest_time()) {
-      return Value{report_[index(0)].speed_rad_s, seconds(time - newest_time())};
+    if (time >= newest_time()) {
+      const Duration last = count_ > 1 ? newest_time() - report_[index(1)].time : Duration{0};
+      return Value{report_[index(0)].speed_rad_s, seconds(std::max(time - newest_time(), last))};
     }
     for (std::size_t back = 1; back < count_; ++back) {
       const Report& before = report_[index(back)];

@@ -70,9 +70,10 @@ TEST(OrderTrackerClocks, AnExactClockIsLeftAlone) {
 }
 
 TEST(OrderTrackerMotion, MotionFarBelowTheRotorsAddsLittleNoise) {
+  constexpr double kHighPass_rad_s = kHover_rad_s / 3.0;
   // Of 1 m/s² at 30 Hz the two poles at 800/3 rad/s = 42 Hz leave 1/(1 + (42/30)²) = 0.34.
-  Tracker still{{.reference_speed_rad_s = kHover_rad_s}};
-  Tracker moved{{.reference_speed_rad_s = kHover_rad_s}};
+  Tracker still{{.reference_speed_rad_s = kHover_rad_s, .high_pass_rad_s = kHighPass_rad_s}};
+  Tracker moved{{.reference_speed_rad_s = kHover_rad_s, .high_pass_rad_s = kHighPass_rad_s}};
   EXPECT_NEAR(amplitude_found(still, 0.0, 0.0, 6.0), 2.0, 0.1);
   EXPECT_NEAR(amplitude_found(moved, 0.0, 1.0, 6.0), 2.0, 0.2);
   const double added_m_s2 = std::sqrt(moved.noise_variance_m2_s4() - still.noise_variance_m2_s4());

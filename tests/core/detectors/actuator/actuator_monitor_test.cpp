@@ -1,0 +1,243 @@
+#include "core/detectors/actuator/actuator_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "tests/support/allocation_guard.h"
+#include "tests/support/hovering_multirotor.h"
+
+namespace airworthy::actuator {
+namespace {
+
+using test::HoveringMultirotor;
+using Transition = FaultLifeCycle::Transition;
+
+/// A vehicle and the monitor that watches it.
+class Flight {
+ public:
+  explicit Flight(std::size_t rotors, unsigned seed = 1, InputSource source = InputSource::kCommand)
+      : body{rotors, seed}, monitor{params(body.vehicle, source)} {}
+
+  static ActuatorMonitorParams params(const Multirotor& vehicle, InputSource source) {
+    ActuatorMonitorParams params;
+    params.vehicle = vehicle;
+    params.source = source;
+    return params;
+  }
+
+  [[nodiscard]] TimePoint now() const { return TimePoint{} + from_seconds(body.time_s); }
+
+  void fly(double seconds, Phase phase = Phase::kInFlight) {
+    const int steps = static_cast<int>(std::lround(seconds / HoveringMultirotor::kStep_s));
+    for (int i = 0; i < steps; ++i) {
+      body.step();
+      if (++steps_ % 2 == 0) {
+        monitor.on_rotor_commands(now(), std::span{body.command_ratio}.first(body.vehicle.rotor_count));
+        monitor.on_rotor_speeds(now(), std::span{body.speed_rad_s}.first(body.vehicle.rotor_count));
+      }
+      (void)monitor.on_imu({now(), body.accel_m_s2, body.gyro_rad_s}, phase);
+      for (std::size_t r = 0; r < monitor.rotors().size(); ++r) {
+        if (monitor.rotors()[r].transition != Transition::kRaise) continue;
+        ++raised;
+        if (!named) {
+          named = r;
+          raised_s = body.time_s;
+          verdict = monitor.rotors()[r];
+        }
+      }
+      for (const LossVerdict& axis : monitor.axes())
+        axis_raised += axis.transition == Transition::kRaise ? 1 : 0;
+    }
+  }
+
+  HoveringMultirotor body;
+  ActuatorMonitor monitor;
+  std::optional<std::size_t> named;
+  LossVerdict verdict;
+  double raised_s = 0;
+  int raised = 0;
+  int axis_raised = 0;
+
+ private:
+  int steps_ = 0;
+};
+
+TEST(ActuatorMonitor, IsSilentWhileHealthyWhateverTheNumberOfRotors) {
+  for (const std::size_t rotors : {4U, 6U, 8U}) {
+    Flight flight{rotors};
+    flight.fly(30);
+    EXPECT_EQ(flight.raised, 0) << rotors;
+    EXPECT_EQ(flight.axis_raised, 0) << rotors;
+    EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+    EXPECT_EQ(flight.monitor.refused(), 0);
+    for (const LossVerdict& rotor : flight.monitor.rotors()) {
+      EXPECT_EQ(rotor.reason, NotJudged::kJudged);
+      EXPECT_NEAR(rotor.test_gamma, 0.0, 0.08);
+    }
+  }
+}
+
+TEST(ActuatorMonitor, NamesTheRotorAndMeasuresItsLoss) {
+  for (const std::size_t rotors : {4U, 6U, 8U}) {
+    for (const std::size_t failed : {0U, 3U}) {
+      Flight flight{rotors, 7};
+      flight.fly(30);
+      flight.body.loss_ratio[failed] = 0.5;
+      const double onset_s = flight.body.time_s;
+      flight.fly(2);
+      ASSERT_TRUE(flight.named) << rotors;
+      EXPECT_EQ(*flight.named, failed) << rotors;
+      EXPECT_EQ(flight.verdict.candidates >> failed & 1U, 1U);
+      // Four forces tell four rotors apart; of more, neighbours act nearly alike and come as candidates at first.
+      EXPECT_TRUE(flight.verdict.is_isolated || rotors > 4);
+      EXPECT_EQ(flight.verdict.is_isolated, flight.verdict.candidates == 1U << failed);
+      EXPECT_EQ(flight.raised, 1);
+      EXPECT_EQ(flight.axis_raised, 0);
+      EXPECT_LT(flight.raised_s - onset_s, rotors == 4 ? 0.5 : 1.5) << rotors;
+      EXPECT_NEAR(to_seconds(flight.verdict.onset - TimePoint{}), onset_s, 0.15);
+    }
+  }
+}
+
+TEST(ActuatorMonitor, OfAQuadrotorEveryLossIsEstimated) {
+  Flight flight{4, 3};
+  flight.fly(30);
+  flight.body.loss_ratio[2] = 0.3;
+  flight.fly(3);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const LossVerdict& rotor = flight.monitor.rotors()[i];
+    EXPECT_NEAR(rotor.gamma - rotor.baseline, i == 2 ? 0.3 : 0.0, 0.08) << i;
+    EXPECT_LT(rotor.sigma, 0.12);
+  }
+}
+
+TEST(ActuatorMonitor, AMotorThatDoesNotFollowIsALossThoughItsSpeedIsKnown) {
+  Flight flight{4, 3, InputSource::kAuto};
+  flight.fly(30);
+  flight.body.loss_ratio[1] = 0.6;
+  flight.fly(1);
+  ASSERT_TRUE(flight.named);
+  EXPECT_EQ(*flight.named, 1U);
+}
+
+TEST(ActuatorMonitor, ARotorThatGivesMoreIsNoLoss) {
+  Flight flight{4, 3};
+  flight.fly(30);
+  flight.body.loss_ratio[2] = -0.25;
+  flight.fly(5);
+  EXPECT_EQ(flight.raised, 0);
+}
+
+TEST(ActuatorMonitor, AnAxisNobodyMovesIsNotExcited) {
+  Flight flight{4, 5};
+  flight.body.excitation = 0.0;
+  flight.fly(20);
+  for (const Axis axis : {kRoll, kPitch, kYaw}) {
+    EXPECT_EQ(flight.monitor.axes()[axis].reason, NotJudged::kNotExcited);
+    EXPECT_GT(flight.monitor.axes()[axis].sigma, 0.2);
+  }
+  EXPECT_EQ(flight.monitor.axes()[kHeight].reason, NotJudged::kJudged);  // weight is always carried
+}
+
+TEST(ActuatorMonitor, AnExcitedAxisIsKnown) {
+  Flight flight{4, 5};
+  flight.body.excitation = 6.0;
+  flight.fly(20);
+  for (const Axis axis : {kRoll, kPitch}) {
+    EXPECT_EQ(flight.monitor.axes()[axis].reason, NotJudged::kJudged) << flight.monitor.axes()[axis].sigma;
+    EXPECT_NEAR(flight.monitor.axes()[axis].gamma, 0.0, 0.3);
+  }
+}
+
+TEST(ActuatorMonitor, TheCompensatedStateFollowsTheTruth) {
+  Flight flight{4, 5};
+  flight.fly(30);
+  flight.body.loss_ratio[0] = 0.4;
+  for (int i = 0; i < 500; ++i) {
+    flight.fly(0.002);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const AxisState& state = flight.monitor.axis_states()[axis];
+      ASSERT_NEAR(state.rate, flight.body.rates_rad_s[axis], 0.08);
+      ASSERT_LT(state.rate_sigma, 0.06);
+    }
+  }
+}
+
+TEST(ActuatorMonitor, JudgesNothingOutsideFlight) {
+  for (const Phase phase :
+       {Phase::kOnGround, Phase::kTakeOff, Phase::kLanding, Phase::kContact, Phase::kUnknown}) {
+    Flight flight{4};
+    flight.body.loss_ratio[0] = 0.9;
+    flight.fly(5, phase);
+    EXPECT_EQ(flight.raised, 0);
+    EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+    EXPECT_EQ(flight.monitor.reason(), NotJudged::kNotFlying);
+    EXPECT_TRUE(std::isnan(flight.monitor.axis_states()[kRoll].rate));
+    EXPECT_TRUE(std::isnan(flight.monitor.rotors()[0].gamma));
+  }
+}
+
+TEST(ActuatorMonitor, AFaultOutlivesALanding) {
+  Flight flight{4};
+  flight.fly(30);
+  flight.body.loss_ratio[0] = 0.5;
+  flight.fly(2);
+  ASSERT_EQ(flight.raised, 1);
+  flight.fly(2, Phase::kLanding);
+  flight.fly(8);
+  EXPECT_EQ(flight.raised, 1);  // latched: raised before, and not again
+}
+
+TEST(ActuatorMonitor, RefusesWhatIsNoSampleAndNoticesSilence) {
+  Flight flight{4};
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kInitialising);
+  flight.fly(5);
+  const MonitorSample bad{
+      flight.now() + from_seconds(0.002), {std::numeric_limits<double>::quiet_NaN(), 0, 0}, {}};
+  EXPECT_EQ(flight.monitor.on_imu(bad, Phase::kInFlight), UpdateStatus::kNotFinite);
+  EXPECT_EQ(
+      flight.monitor.on_imu({flight.now(), flight.body.accel_m_s2, flight.body.gyro_rad_s}, Phase::kInFlight),
+      UpdateStatus::kTimeBackward);
+  EXPECT_EQ(flight.monitor.refused(), 2);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+  flight.monitor.on_clock(flight.now() + from_seconds(0.6));
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kNoInput);
+}
+
+TEST(ActuatorMonitor, WithoutRotorInputItSaysSo) {
+  HoveringMultirotor body{4, 1};
+  ActuatorMonitor monitor{Flight::params(body.vehicle, InputSource::kAuto)};
+  for (int i = 0; i < 100; ++i) {
+    body.step();
+    (void)monitor.on_imu({TimePoint{} + from_seconds(body.time_s), body.accel_m_s2, body.gyro_rad_s},
+                         Phase::kInFlight);
+  }
+  EXPECT_EQ(monitor.reason(), NotJudged::kNoInput);
+}
+
+TEST(ActuatorMonitor, TimeShiftChangesNothingAndNoHeapIsUsed) {
+  HoveringMultirotor body{4, 1};
+  ActuatorMonitor early{Flight::params(body.vehicle, InputSource::kCommand)};
+  ActuatorMonitor late{Flight::params(body.vehicle, InputSource::kCommand)};
+  const Duration shift = from_seconds(1e6);
+  const test::AllocationGuard guard;
+  for (int i = 0; i < 3000; ++i) {
+    body.step();
+    const TimePoint now = TimePoint{} + from_seconds(body.time_s);
+    const auto commands = std::span{body.command_ratio}.first(4);
+    early.on_rotor_commands(now, commands);
+    late.on_rotor_commands(now + shift, commands);
+    (void)early.on_imu({now, body.accel_m_s2, body.gyro_rad_s}, Phase::kInFlight);
+    (void)late.on_imu({now + shift, body.accel_m_s2, body.gyro_rad_s}, Phase::kInFlight);
+  }
+  ASSERT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(early.state(), DetectorState::kMonitoring);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(early.rotors()[i].gamma, late.rotors()[i].gamma);
+}
+
+}  // namespace
+}  // namespace airworthy::actuator

@@ -1,0 +1,95 @@
+#include "core/detectors/actuator/rotor_thrust.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace airworthy::actuator {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Multirotor vehicle() {
+  Multirotor v;
+  v.mass_kg = 2.0;
+  v.thrust_coefficient_N_s2 = 1e-5;
+  v.propeller_inertia_kg_m2 = 1e-4;
+  v.motor_time_constant_s = 0.05;
+  v.speed_min_rad_s = 100;
+  v.speed_max_rad_s = 900;
+  v.rotor_count = 3;
+  v.rotor[0].spin = 1;
+  v.rotor[1].spin = -1;
+  v.rotor[2].spin = 1;
+  return v;
+}
+
+TimePoint at(double s) { return TimePoint{} + from_seconds(s); }
+
+TEST(RotorThrust, FollowsCommandsWithTheMotorsLag) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  thrust.advance(at(0), 0.0);
+  EXPECT_FALSE(thrust.is_known());
+  thrust.on_commands(at(0), std::array{0.0, 0.0, 0.0});
+  thrust.on_commands(at(0), std::array{1.0, 0.5, kNan});  // not all known: no command
+  thrust.on_commands(at(0), std::array{1.0, 0.5, 0.0});
+  for (int i = 1; i <= 50; ++i) thrust.advance(at(0.001 * i), 0.001);
+  ASSERT_TRUE(thrust.is_known());
+  EXPECT_NEAR(thrust.speed_rad_s(0), 900 - 800 * std::exp(-1.0), 1e-6);
+  EXPECT_NEAR(thrust.speed_rad_s(1), 500 - 400 * std::exp(-1.0), 1e-6);
+  EXPECT_DOUBLE_EQ(thrust.speed_rad_s(2), 100);
+  const double speed = thrust.speed_rad_s(0);
+  EXPECT_DOUBLE_EQ(thrust.specific_thrust_m_s2(0), 1e-5 * speed * speed / 2.0);
+  thrust.advance(at(0.6), 0.001);
+  EXPECT_FALSE(thrust.is_known());
+}
+
+TEST(RotorThrust, SpeedsCorrectCommandsSlowlyAndNotBeyondAFifth) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  double after_a_tenth = 0;
+  for (int i = 0; i <= 20'000; ++i) {
+    thrust.on_commands(at(0.001 * i), std::array{0.5, 0.5, 0.5});
+    thrust.on_speeds(at(0.001 * i), std::array{450.0, 0.0, 500.0});
+    thrust.advance(at(0.001 * i), 0.001);
+    if (i == 100) after_a_tenth = thrust.speed_rad_s(0);
+  }
+  EXPECT_NEAR(after_a_tenth, 500 - 50 * (1 - std::exp(-0.05)), 0.1);
+  EXPECT_NEAR(thrust.speed_rad_s(0), 450.0, 0.1);
+  EXPECT_NEAR(thrust.speed_rad_s(1), 400.0, 1e-6);  // a motor that stands still stays a loss
+  EXPECT_NEAR(thrust.speed_rad_s(2), 500.0, 1e-6);
+}
+
+TEST(RotorThrust, SpeedsAloneAreFollowed) {
+  RotorThrust thrust{vehicle(), InputSource::kSpeed};
+  for (int i = 0; i <= 1000; ++i) {
+    thrust.on_commands(at(0.001 * i), std::array{1.0, 1.0, 1.0});
+    thrust.on_speeds(at(0.001 * i), std::array{-450.0, kNan, 1e9});  // signed, not reported, not a speed
+    thrust.advance(at(0.001 * i), 0.001);
+  }
+  EXPECT_NEAR(thrust.speed_rad_s(0), 450.0, 1e-3);
+}
+
+TEST(RotorThrust, SpinningUpTakesTorque) {
+  RotorThrust thrust{vehicle(), InputSource::kCommand};
+  thrust.on_commands(at(0), std::array{0.0, 0.0, 0.0});
+  thrust.advance(at(0), 0.001);
+  EXPECT_DOUBLE_EQ(thrust.angular_momentum_N_m_s(), 1e-4 * (100 - 100 + 100));
+  thrust.on_commands(at(0), std::array{0.5, 0.0, 0.0});
+  thrust.advance(at(0.0001), 0.0001);
+  EXPECT_NEAR(thrust.spin_up_torque_N_m(), 1e-4 * 400 / 0.05, 1e-3);  // J·Δω/τ at the beginning
+}
+
+TEST(RotorThrust, AJumpBetweenTwoInputsLeavesItsImpulseUncertain) {
+  RotorThrust thrust{vehicle(), InputSource::kCommand};
+  thrust.on_commands(at(0), std::array{0.0, 0.5, 0.5});
+  thrust.on_commands(at(0.02), std::array{0.5, 0.5, 0.5});
+  const auto missed = thrust.take_missed_m_s();
+  EXPECT_NEAR(missed[0], 0.5 * 0.02 * 1e-5 / 2.0 * (500.0 * 500 - 100 * 100), 1e-12);
+  EXPECT_EQ(missed[1], 0.0);
+  EXPECT_EQ(thrust.take_missed_m_s()[0], 0.0);
+}
+
+}  // namespace
+}  // namespace airworthy::actuator

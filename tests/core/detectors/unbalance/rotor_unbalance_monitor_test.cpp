@@ -1,0 +1,396 @@
+#include "core/detectors/unbalance/rotor_unbalance_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <random>
+
+#include "tests/support/allocation_guard.h"
+
+namespace airworthy {
+namespace {
+
+using Complex = std::complex<double>;
+using Transition = FaultLifeCycle::Transition;
+using Reason = UnbalanceNotJudged;
+constexpr std::size_t kN = 4;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+TimePoint at(double time_s) { return from_us(std::llround((1000.0 + time_s) * 1e6)); }
+
+/// A quadrotor that hovers at 470 rad/s.
+Multirotor quadrotor() {
+  Multirotor vehicle;
+  vehicle.mass_kg = 0.69;
+  vehicle.thrust_coefficient_N_s2 = 7.64e-6;
+  vehicle.rotor_count = kN;
+  for (std::size_t i = 0; i < kN; ++i) vehicle.rotor[i].spin = i < 2 ? -1 : 1;
+  return vehicle;
+}
+
+UnbalanceParams params_with_baseline() {
+  UnbalanceParams params;
+  params.vehicle = quadrotor();
+  params.has_baseline = true;
+  params.baseline_m_s2 = {0.2, 0.3, 0.1, 0.4};
+  params.baseline_sigma_m_s2.fill(0.05);
+  return params;
+}
+
+/// Flies a vehicle whose rotors wander about means of their own, and keeps what the monitor said.
+struct Flight {
+  explicit Flight(const UnbalanceParams& params = params_with_baseline())
+      : hover_rad_s{UnbalanceMonitor::hover_speed_rad_s(params.vehicle)}, monitor{params} {
+    monitor.on_phase(Phase::kInFlight);
+  }
+
+  void fly(double duration_s) {
+    const double end_s = time_s + duration_s;
+    for (; time_s < end_s - 1e-9; time_s += dt_s) step();
+  }
+
+  void step() {
+    for (std::size_t i = 0; i < kN; ++i) {
+      speed[i] = hover_rad_s + offset_rad_s[i] + wander_rad_s[i] * std::sin((1.0 + rate[i]) * time_s);
+      phase[i] += speed[i] * dt_s;
+    }
+    if (time_s >= next_report_s - 1e-9) {
+      next_report_s += 0.01;
+      std::array<double, kN> told;
+      for (std::size_t i = 0; i < kN; ++i) {
+        told[i] =
+            is_frozen[i] ? 480.0 : speed[i] * telemetry_factor[i] * (1.0 + telemetry_noise * normal(random));
+      }
+      monitor.on_speeds(at(time_s), told);
+    }
+    Complex circle = 0.0;  // x + j·y
+    for (std::size_t i = 0; i < kN; ++i) {
+      const double spin = i < 2 ? -1.0 : 1.0;
+      const double ratio = speed[i] / hover_rad_s;
+      circle += ratio * ratio * (natural[i] + damage[i]) * average(i) *
+                std::polar(1.0, spin * phase[i] + 2.0 * spin);
+    }
+    circle += foreign_m_s2 * std::cos(430.0 * time_s);
+    circle += noise_m_s2 * Complex{normal(random), normal(random)};
+    if (monitor.on_accel(at(time_s), circle.real(), circle.imag(), window_s)) note();
+  }
+
+  [[nodiscard]] double average(std::size_t i) const {
+    const double half = 0.5 * speed[i] * window_s;
+    return half > 0.0 ? std::sin(half) / half : 1.0;
+  }
+
+  void note() {
+    for (std::size_t i = 0; i < kN; ++i) {
+      const Transition transition = monitor.rotors()[i].transition;
+      if (transition == Transition::kRaise) {
+        blamed |= 1U << i;
+        if (found_s < 0.0) found_s = time_s;
+      }
+      if (transition == Transition::kClear) cleared |= 1U << i;
+    }
+    if (monitor.ambiguity() == Transition::kRaise) {
+      is_ambiguous = true;
+      candidates = monitor.candidates();
+    }
+  }
+
+  [[nodiscard]] Reason reason(std::size_t rotor) const { return monitor.rotors()[rotor].reason; }
+
+  double hover_rad_s;
+  RotorUnbalanceMonitor<kN> monitor;
+  std::array<double, kN> natural{0.2, 0.3, 0.1, 0.4};
+  std::array<double, kN> damage{};
+  std::array<double, kN> offset_rad_s{-9.0, -2.0, 4.0, 12.0};
+  std::array<double, kN> wander_rad_s{6.0, 6.0, 6.0, 6.0};
+  std::array<double, kN> rate{0.1, 0.6, 0.3, 0.9};
+  std::array<double, kN> telemetry_factor{1.0, 1.0, 1.0, 1.0};
+  std::array<bool, kN> is_frozen{};
+  double telemetry_noise = 0.003;
+  double noise_m_s2 = 0.4;
+  double foreign_m_s2 = 0.0;  ///< along x at 68 Hz, the speed of no rotor
+  double window_s = 0.0;
+  double dt_s = 0.002;
+  double time_s = 0.0;
+  double next_report_s = 0.0;
+  std::array<double, kN> speed{};
+  std::array<double, kN> phase{};
+  std::mt19937 random{9};
+  std::normal_distribution<double> normal;
+
+  std::uint32_t blamed = 0;
+  std::uint32_t cleared = 0;
+  std::uint32_t candidates = 0;
+  bool is_ambiguous = false;
+  double found_s = -1.0;
+};
+
+TEST(RotorUnbalanceMonitor, IsSilentAboutAHealthyVehicle) {
+  Flight flight;
+  flight.fly(60.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  EXPECT_FALSE(flight.is_ambiguous);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+  for (std::size_t i = 0; i < kN; ++i) {
+    EXPECT_EQ(flight.reason(i), Reason::kJudged);
+    EXPECT_NEAR(flight.monitor.rotors()[i].amplitude_m_s2, flight.natural[i], 0.15);
+  }
+}
+
+TEST(RotorUnbalanceMonitor, BlamesEachRotorForItsOwnDamage) {
+  for (std::size_t rotor = 0; rotor < kN; ++rotor) {
+    Flight flight;
+    flight.fly(10.0);
+    ASSERT_EQ(flight.blamed, 0U);
+    flight.damage[rotor] = 1.2;
+    flight.fly(5.0);
+    EXPECT_EQ(flight.blamed, 1U << rotor);
+    EXPECT_LT(flight.found_s, 12.5);
+    const RotorUnbalance& found = flight.monitor.rotors()[rotor];
+    EXPECT_NEAR(found.growth_m_s2, 1.2, 0.2);
+    EXPECT_GE(found.test_ratio, 1.0);
+    EXPECT_GT(found.onset, at(10.0));
+    EXPECT_LE(found.onset, at(flight.found_s));
+  }
+}
+
+TEST(RotorUnbalanceMonitor, TwoDamagedRotorsAreBothBlamed) {
+  Flight flight;
+  flight.damage = {0.0, 1.5, 1.5, 0.0};
+  flight.fly(6.0);
+  EXPECT_EQ(flight.blamed, 0b0110U);
+}
+
+// But for three periods of judging: the tracker meets large damage with a new start.
+TEST(RotorUnbalanceMonitor, MoreDamageIsNeverFoundLater) {
+  const double start_s = 3.0 * to_seconds(UnbalanceMonitor::kPeriod);
+  double before_s = std::numeric_limits<double>::infinity();
+  int found = 0;
+  for (const double size : {0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 40.0}) {
+    Flight flight;  // the same noise each time
+    flight.fly(3.0);
+    flight.damage[2] = size;
+    flight.fly(6.0);
+    EXPECT_EQ(flight.blamed & ~0b0100U, 0U) << size;
+    if (flight.blamed == 0U) {
+      EXPECT_EQ(found, 0) << size << " is not found but less was";
+      continue;
+    }
+    ++found;
+    EXPECT_LE(flight.found_s, before_s + start_s) << size;
+    before_s = std::min(before_s, flight.found_s);
+  }
+  EXPECT_GE(found, 8);
+}
+
+TEST(RotorUnbalanceMonitor, WithoutABaselineAnUsualUnbalanceIsNoGrowth) {
+  UnbalanceParams params = params_with_baseline();
+  params.has_baseline = false;
+  Flight flight{params};
+  flight.fly(20.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  flight.damage[0] = 1.5;
+  flight.fly(5.0);
+  EXPECT_EQ(flight.blamed, 0b0001U);
+}
+
+// However large: a prior that is narrow beside the amplitude would let both seem known.
+TEST(RotorUnbalanceMonitor, OfTwoRotorsOfOneSpeedNobodyIsBlamedAndBothAreNamed) {
+  for (const double size : {2.0, 10.0, 30.0}) {
+    for (const std::size_t damaged : {2U, 3U}) {
+      Flight flight;
+      flight.offset_rad_s[3] = flight.offset_rad_s[2];
+      flight.rate[3] = flight.rate[2];
+      flight.damage[damaged] = size;
+      flight.fly(20.0);
+      EXPECT_EQ(flight.blamed, 0U) << size;
+      EXPECT_EQ(flight.reason(2), Reason::kConfounded);
+      EXPECT_EQ(flight.reason(3), Reason::kConfounded);
+      EXPECT_EQ(flight.monitor.rotors()[2].confounded_with, 0b1000U);
+      EXPECT_EQ(flight.monitor.rotors()[3].confounded_with, 0b0100U);
+      EXPECT_EQ(flight.reason(0), Reason::kJudged);
+      EXPECT_TRUE(flight.is_ambiguous) << size;
+      EXPECT_EQ(flight.candidates, 0b1100U) << size;
+    }
+  }
+}
+
+TEST(RotorUnbalanceMonitor, InAStillHoverNobodyIsBlamed) {
+  Flight flight;
+  flight.offset_rad_s.fill(0.0);
+  flight.wander_rad_s.fill(0.0);
+  flight.damage[1] = 8.0;
+  flight.fly(60.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  for (std::size_t i = 0; i < kN; ++i) {
+    EXPECT_EQ(flight.reason(i), Reason::kConfounded);
+    EXPECT_EQ(flight.monitor.rotors()[i].confounded_with, 0b1111U & ~(1U << i));
+  }
+}
+
+TEST(RotorUnbalanceMonitor, WhatWasFoundStaysFoundInAStillHover) {
+  Flight flight;
+  flight.damage[1] = 3.0;
+  flight.fly(5.0);
+  ASSERT_EQ(flight.blamed, 0b0010U);
+  flight.offset_rad_s.fill(0.0);
+  flight.wander_rad_s.fill(0.0);
+  flight.fly(60.0);
+  EXPECT_EQ(flight.blamed, 0b0010U);
+  EXPECT_EQ(flight.cleared, 0U);
+  EXPECT_FALSE(flight.is_ambiguous);
+}
+
+TEST(RotorUnbalanceMonitor, AFaultThatHealsIsClearedAfterItsTime) {
+  Flight flight;
+  flight.damage[1] = 2.0;
+  flight.fly(5.0);
+  ASSERT_EQ(flight.blamed, 0b0010U);
+  flight.damage[1] = 0.0;
+  flight.fly(8.0);
+  EXPECT_EQ(flight.cleared, 0U);
+  flight.fly(15.0);
+  EXPECT_EQ(flight.cleared, 0b0010U);
+}
+
+TEST(RotorUnbalanceMonitor, IsMutedUnlessItFlies) {
+  for (const Phase phase :
+       {Phase::kUnknown, Phase::kOnGround, Phase::kTakeOff, Phase::kLanding, Phase::kContact}) {
+    Flight flight;
+    flight.damage[1] = 5.0;
+    flight.monitor.on_phase(phase);
+    flight.fly(5.0);
+    EXPECT_EQ(flight.blamed, 0U);
+    EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+    EXPECT_EQ(flight.reason(1), Reason::kNotFlying);
+    flight.monitor.on_phase(Phase::kInFlight);
+    flight.fly(5.0);
+    EXPECT_EQ(flight.blamed, 0b0010U);
+    flight.monitor.on_phase(phase);  // after the landing it is known still
+    flight.fly(30.0);
+    EXPECT_EQ(flight.cleared, 0U);
+  }
+}
+
+TEST(RotorUnbalanceMonitor, FrozenSpeedsAreImplausible) {
+  Flight flight;
+  flight.damage[1] = 5.0;
+  flight.is_frozen[0] = true;
+  flight.fly(10.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+  for (std::size_t i = 0; i < kN; ++i) EXPECT_EQ(flight.reason(i), Reason::kSpeedImplausible);
+}
+
+TEST(RotorUnbalanceMonitor, ElectricalSpeedsAreImplausible) {
+  Flight flight;
+  flight.damage[1] = 5.0;
+  flight.telemetry_factor.fill(7.0);
+  flight.fly(10.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  for (std::size_t i = 0; i < kN; ++i) EXPECT_EQ(flight.reason(i), Reason::kSpeedImplausible);
+}
+
+TEST(RotorUnbalanceMonitor, OneRotorWithElectricalSpeedIsImplausible) {
+  Flight flight;
+  flight.damage[1] = 5.0;
+  flight.telemetry_factor[2] = 7.0;
+  flight.fly(10.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  EXPECT_EQ(flight.reason(1), Reason::kSpeedImplausible);
+}
+
+TEST(RotorUnbalanceMonitor, ARotorWithoutSpeedLeavesAllUnjudged) {
+  Flight flight;
+  flight.fly(5.0);
+  flight.telemetry_factor[2] = kNaN;
+  flight.damage[1] = 5.0;
+  flight.fly(5.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  EXPECT_EQ(flight.reason(1), Reason::kSpeedUnknown);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+  flight.telemetry_factor[2] = 1.0;
+  flight.fly(5.0);
+  EXPECT_EQ(flight.blamed, 0b0010U);
+}
+
+// 200 Hz averages of 5 ms leave a sixth of 242 Hz: unfit where the noise hides the rest, and only there.
+TEST(RotorUnbalanceMonitor, AveragedInertialDataIsUnfitWhereItTrulyIs) {
+  UnbalanceParams small = params_with_baseline();
+  small.vehicle.mass_kg = 0.039;
+  small.vehicle.thrust_coefficient_N_s2 = 4.14e-8;
+  for (const bool averages : {false, true}) {
+    for (const double noise_m_s2 : {0.02, 3.0}) {
+      Flight flight{small};
+      flight.noise_m_s2 = noise_m_s2;
+      flight.telemetry_noise = 0.001;
+      if (averages) flight.window_s = flight.dt_s = 0.005;
+      flight.fly(5.0);
+      EXPECT_EQ(flight.blamed, 0U);
+      EXPECT_EQ(flight.reason(1) == Reason::kUnfitInertialData, averages && noise_m_s2 > 1.0)
+          << averages << ", " << noise_m_s2;
+      if (noise_m_s2 < 1.0) {
+        EXPECT_EQ(flight.reason(1), Reason::kJudged) << averages;
+      }
+    }
+  }
+  Flight large;  // 75 Hz passes nearly whole
+  large.window_s = large.dt_s = 0.005;
+  large.damage[3] = 1.2;
+  large.fly(6.0);
+  EXPECT_EQ(large.blamed, 0b1000U);
+}
+
+TEST(RotorUnbalanceMonitor, TellsAVibrationThatIsNoRotorsFromDamage) {
+  Flight flight;
+  flight.fly(5.0);
+  flight.foreign_m_s2 = 5.0;
+  flight.fly(20.0);
+  EXPECT_EQ(flight.blamed, 0U);
+}
+
+TEST(RotorUnbalanceMonitor, RefusesSpeedsOfAnotherNumberOfRotors) {
+  RotorUnbalanceMonitor<kN> monitor{params_with_baseline()};
+  monitor.on_phase(Phase::kInFlight);
+  const std::array<double, 6> six{470.0, 471.0, 472.0, 473.0, 474.0, 475.0};
+  for (int k = 0; k < 1000; ++k) {
+    monitor.on_speeds(at(0.002 * k), six);
+    (void)monitor.on_accel(at(0.002 * k), 1.0, 0.0, 0.0);
+  }
+  EXPECT_EQ(monitor.rotors()[0].reason, Reason::kSpeedUnknown);
+}
+
+TEST(RotorUnbalanceMonitor, NotANumberBlamesNobodyAndIsCounted) {
+  Flight flight;
+  flight.fly(5.0);
+  for (int k = 0; k < 100; ++k) {
+    (void)flight.monitor.on_accel(at(flight.time_s), kNaN, 0.0, 0.0);
+    (void)flight.monitor.on_accel(at(flight.time_s), 0.0, HUGE_VAL, 0.0);
+    flight.fly(0.002);
+  }
+  EXPECT_EQ(flight.blamed, 0U);
+  EXPECT_EQ(flight.monitor.innovation().samples_refused, 200);
+  EXPECT_TRUE(std::isfinite(flight.monitor.rotors()[0].amplitude_m_s2));
+}
+
+TEST(RotorUnbalanceMonitor, KnowsTheMassOfAnAmplitude) {
+  const UnbalanceParams params = params_with_baseline();
+  // 40 mg at 0.1 m: m·r·ω²/M.
+  const double speed2 = 0.69 * 9.81 / (4.0 * 7.64e-6);
+  EXPECT_NEAR(UnbalanceMonitor::kg_m_per_m_s2(params) * (40e-6 * 0.1 * speed2 / 0.69), 40e-6 * 0.1, 1e-12);
+}
+
+TEST(RotorUnbalanceMonitor, UsesNoHeap) {
+  Flight flight;
+  flight.damage[1] = 2.0;
+  flight.fly(1.0);
+  const test::AllocationGuard guard;
+  flight.fly(3.0);
+  EXPECT_EQ(guard.allocations(), 0U);
+  EXPECT_EQ(flight.blamed, 0b0010U);
+}
+
+}  // namespace
+}  // namespace airworthy
