@@ -68,6 +68,7 @@ void keep(const Judgement& judgement, FlightRecord& record) {
       record.last_reason = rotor.reason;
       continue;
     }
+    if (rotor.by_power) continue;  // no amplitude by phase
     record.rotors[i].amplitude_m_s2.push_back(rotor.amplitude_m_s2);
     record.rotors[i].against_m_s2.push_back(rotor.against_m_s2);
     record.rotors[i].sigma_m_s2.push_back(rotor.sigma_m_s2);

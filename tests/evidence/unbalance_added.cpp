@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "tests/evidence/unbalance_recorded.h"
 
@@ -15,7 +14,6 @@ struct Link {
   SpeedTelemetry telemetry;
   double told_latency_s;
   bool follows_clocks = true;
-  bool needs_lead = true;  ///< of the rotor that is blamed over the others
 };
 
 constexpr double kResolution_rad_s = 1.5;  // 100 electrical rev/min of 7 pole pairs
@@ -27,14 +25,6 @@ constexpr std::array kLinks{
     Link{.name = "50 Hz, 8 ms late", .telemetry = kLate8, .told_latency_s = 0.008},
     Link{.name = "50 Hz, 50 ms late", .telemetry = kLate50, .told_latency_s = 0.05},
     Link{.name = "50 Hz, 50 ms late, told 8 ms", .telemetry = kLate50, .told_latency_s = 0.008},
-    Link{.name = "as recorded; no lead needed",
-         .telemetry = kFast,
-         .told_latency_s = 0.0,
-         .needs_lead = false},
-    Link{.name = "50 Hz, 8 ms late; no lead needed",
-         .telemetry = kLate8,
-         .told_latency_s = 0.008,
-         .needs_lead = false},
     Link{.name = "as recorded; clocks not followed",
          .telemetry = kFast,
          .told_latency_s = 0.0,
@@ -108,7 +98,6 @@ UnbalanceParams params_for(const RecordedSet& set, const Link& link) {
   UnbalanceParams params = set.params;
   params.speed_latency_s = link.told_latency_s;
   if (!link.follows_clocks) params.most_speed_error_ratio = 0.0;
-  if (!link.needs_lead) params.log_lead = std::numeric_limits<double>::lowest();
   return params;
 }
 
@@ -152,9 +141,7 @@ std::vector<Trial> thrown_trials(const RecordedSet& set, const Link& link) {
 std::vector<Trial> bebop_trials(const RecordedSet& set, const Link& link) {
   Trial trial{&set.flights.front(), kBebopHalf_s, params_for(set, link)};
   const UnbalanceFlight healthy = judge_unbalance(set.flights.front(), trial.params, link.telemetry);
-  std::vector<std::array<double, 4>> amplitudes;
-  for (double from_s = kBebopFrom_s + 1.5; from_s < kBebopHalf_s - 0.5; from_s += 1.0)
-    amplitudes.push_back(healthy.rms_amplitude_m_s2(from_s, from_s + 1.0));
+  const auto amplitudes = amplitudes_by_second(healthy, kBebopFrom_s + 1.5, kBebopHalf_s);
   learn_baseline(amplitudes, trial.params);
   if (link.follows_clocks) {
     trial.params.speed_error_ratio = {};

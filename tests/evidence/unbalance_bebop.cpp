@@ -9,6 +9,7 @@ namespace {
 
 using nlohmann::json;
 using Tracker = OrderTracker<double, 4>;
+constexpr double kHighPass_rad_s = 75.0;  // the tracker's own
 constexpr double kWarmUp_s = 1.5;
 
 struct Tracked {
@@ -30,7 +31,7 @@ Tracked track(const RecordedSet& set, double from_s, double to_s, double scale, 
   const RecordedFlight& flight = set.flights.front();
   const auto params = tracker_params(set, most_speed_error);
   Tracker tracker{params};
-  SensorResponse<double> high_pass{params.reference_speed_rad_s / 3.0, 0.0};
+  SensorResponse<double> high_pass{kHighPass_rad_s, 0.0};
   double residual = 0.0;
   double energy = 0.0;
   double nis = 0.0;
@@ -71,7 +72,7 @@ constexpr auto kNothing = [](double, const Tracker&) {};
 /// The same without any filter: constant amplitudes of the four rotors fitted to blocks of one second.
 double explained_in_blocks(const RecordedSet& set, double scale) {
   const RecordedFlight& flight = set.flights.front();
-  SensorResponse<double> high_pass{UnbalanceMonitor::hover_speed_rad_s(set.params.vehicle) / 3.0, 0.0};
+  SensorResponse<double> high_pass{kHighPass_rad_s, 0.0};
   std::array<double, 4> phase{};
   Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
   Eigen::Matrix<double, 8, 2> right = Eigen::Matrix<double, 8, 2>::Zero();

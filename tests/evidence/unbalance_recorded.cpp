@@ -22,10 +22,12 @@ int main(int argc, char** argv) {
     result = bebop_evidence(data);
   else if (section == "healthy")
     result = healthy_evidence(data);
+  else if (section == "crazypad")
+    result = crazypad_evidence(data);
   else if (section == "added")
     result = added_evidence(data, kSeed);
   else {
-    std::fprintf(stderr, "usage: unbalance_recorded bebop|healthy|added\n");
+    std::fprintf(stderr, "usage: unbalance_recorded bebop|healthy|crazypad|added\n");
     return 64;
   }
   std::printf("%s\n", result.dump(1).c_str());

@@ -73,9 +73,7 @@ TEST(RecordedUnbalance, TheBebopIsSilentBesideTheBaselineOfItsFirstHalf) {
   if (bebop().flights.empty()) GTEST_SKIP() << "no recorded flights in " << recorded_data();
   UnbalanceParams params = bebop().params;
   const UnbalanceFlight first = judge_unbalance(bebop().flights.front(), params);
-  std::vector<std::array<double, 4>> amplitudes;
-  for (double from_s = kBebopFrom_s + 1.5; from_s < kBebopHalf_s - 0.5; from_s += 1.0)
-    amplitudes.push_back(first.rms_amplitude_m_s2(from_s, from_s + 1.0));
+  const auto amplitudes = amplitudes_by_second(first, kBebopFrom_s + 1.5, kBebopHalf_s);
   learn_baseline(amplitudes, params);
   ASSERT_TRUE(params.has_baseline);
   const UnbalanceFlight flight = judge_unbalance(bebop().flights.front(), params);

@@ -14,6 +14,8 @@
 namespace airworthy::testing {
 namespace {
 
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::array<double, 4> kNotKnown{kNaN, kNaN, kNaN, kNaN};
 constexpr double kRpm = 2.0 * std::numbers::pi / 60.0;
 
 /// Columns of a table by name; a row as numbers.
@@ -54,7 +56,7 @@ template <class ToRow>
 RecordedFlight load(const std::filesystem::path& file, std::span<const char* const> names, ToRow to_row) {
   RecordedFlight flight;
   flight.name = file.filename().string();
-  flight.name = flight.name.substr(0, flight.name.find('.'));
+  flight.name = flight.name.substr(0, flight.name.find(".csv"));
   auto table = Table::open(file, names);
   if (!table) return flight;
   std::vector<double> cells;
@@ -76,36 +78,55 @@ RecordedFlight load_bebop(const std::filesystem::path& file) {
     return RecordedRow{.time = from_us(static_cast<std::int64_t>(c[0])),
                        .accel_m_s2 = {c[1], c[2], c[3]},
                        .gyro_rad_s = {c[4], c[5], c[6]},
-                       .speed_rad_s = {c[7] * kRpm, c[8] * kRpm, c[9] * kRpm, c[10] * kRpm}};
+                       .speed_rad_s = {c[7] * kRpm, c[8] * kRpm, c[9] * kRpm, c[10] * kRpm},
+                       .command_ratio = kNotKnown};
   });
 }
 
 RecordedFlight load_thrown(const std::filesystem::path& file) {
-  constexpr std::array names = {"t_s",      "ax_mps2",  "ay_mps2",  "az_mps2",  "gx_radps", "gy_radps",
-                                "gz_radps", "w1_radps", "w2_radps", "w3_radps", "w4_radps"};
+  constexpr std::array names = {"t_s",      "ax_mps2",  "ay_mps2",  "az_mps2",  "gx_radps",
+                                "gy_radps", "gz_radps", "w1_radps", "w2_radps", "w3_radps",
+                                "w4_radps", "u1",       "u2",       "u3",       "u4"};
   // The accelerometer shows minus the specific force in x forward, y right, z down; the gyroscope has y and z turned.
   return load(file, names, [](const std::vector<double>& c, const std::vector<double>*) {
     return RecordedRow{.time = TimePoint{from_seconds(c[0])},
                        .accel_m_s2 = {-c[1], -c[2], -c[3]},
                        .gyro_rad_s = {c[4], -c[5], -c[6]},
-                       .speed_rad_s = {c[7], c[8], c[9], c[10]}};
+                       .speed_rad_s = {c[7], c[8], c[9], c[10]},
+                       .command_ratio = {c[11], c[12], c[13], c[14]}};
   });
 }
 
 RecordedFlight load_crazyflie(const std::filesystem::path& file) {
-  constexpr std::array names = {"t_s",      "ax_mps2",    "ay_mps2",    "az_mps2", "gx_radps",
-                                "gy_radps", "gz_radps",   "erpm1",      "erpm2",   "erpm3",
-                                "erpm4",    "ts_accel_s", "ts_motors_s"};
+  constexpr std::array names = {"t_s",         "ax_mps2", "ay_mps2", "az_mps2", "gx_radps", "gy_radps",
+                                "gz_radps",    "erpm1",   "erpm2",   "erpm3",   "erpm4",    "ts_accel_s",
+                                "ts_motors_s", "u1",      "u2",      "u3",      "u4"};
   constexpr double kPolePairs = 6.0;
   return load(file, names, [](const std::vector<double>& c, const std::vector<double>* before) {
     RecordedRow row{.time = TimePoint{from_seconds(c[0])},
                     .accel_m_s2 = {c[1], -c[2], -c[3]},
                     .gyro_rad_s = {c[4], -c[5], -c[6]},
-                    .speed_rad_s = {}};
+                    .speed_rad_s = {},
+                    .command_ratio = {c[13], c[14], c[15], c[16]}};
     for (std::size_t i = 0; i < 4; ++i) row.speed_rad_s[i] = c[7 + i] * kRpm / kPolePairs;
     row.has_new_accel = before == nullptr || (*before)[11] != c[11];
     row.has_new_speed = before == nullptr || (*before)[12] != c[12];
     return row;
+  });
+}
+
+RecordedFlight load_crazypad(const std::filesystem::path& file) {
+  constexpr std::array names = {"t_s", "ax_g", "ay_g", "az_g", "m1", "m2", "m3", "m4"};
+  constexpr double kGravity_m_s2 = 9.80665;
+  constexpr double kFullCommand = 65535.0;
+  return load(file, names, [](const std::vector<double>& c, const std::vector<double>*) {
+    return RecordedRow{
+        .time = TimePoint{from_seconds(c[0])},
+        .accel_m_s2 = {kGravity_m_s2 * c[1], -kGravity_m_s2 * c[2], -kGravity_m_s2 * (c[3] + 1.0)},
+        .gyro_rad_s = {},
+        .speed_rad_s = kNotKnown,
+        .command_ratio = {c[4] / kFullCommand, c[5] / kFullCommand, c[6] / kFullCommand,
+                          c[7] / kFullCommand}};
   });
 }
 
@@ -153,6 +174,7 @@ class DelayedSpeeds {
   template <class Deliver>
   void step(const RecordedRow& row, Deliver deliver) {
     const double period_s = telemetry_.period_s;
+    if (!std::isfinite(row.speed_rad_s[0])) return;
     if (row.has_new_speed && (!last_ || to_seconds(row.time - *last_) >= period_s - 1e-4)) {
       // The times of sending keep their pace although they fall on rows.
       last_ = last_ && to_seconds(row.time - *last_) < 2.0 * period_s ? *last_ + from_seconds(period_s)
@@ -186,7 +208,7 @@ void note(const UnbalanceMonitor& monitor, double time_s, double since_last_s, U
     moment.amplitude_m_s2[i] = rotor.amplitude_m_s2;
     moment.sigma_m_s2[i] = rotor.sigma_m_s2;
     moment.log_odds[i] = rotor.log_odds;
-    moment.is_judged[i] = rotor.reason == UnbalanceNotJudged::kJudged;
+    moment.is_judged[i] = rotor.reason == UnbalanceNotJudged::kJudged && !rotor.by_power;
     any = any || moment.is_judged[i];
     if (rotor.transition == FaultLifeCycle::Transition::kRaise)
       result.reports.push_back({i, time_s, rotor.growth_m_s2, rotor.growth_sigma_m_s2});
@@ -213,6 +235,10 @@ UnbalanceFlight judge_unbalance(const RecordedFlight& flight, const UnbalancePar
       phase.on_rotor_speeds(time, speed);
       monitor.on_speeds(time, speed);
     });
+    if (std::isfinite(row.command_ratio[0])) {
+      phase.on_rotor_commands(row.time, row.command_ratio);
+      monitor.on_commands(row.time, row.command_ratio);
+    }
     if (!row.has_new_accel) continue;
     phase.on_imu(row.time, row.accel_m_s2, row.gyro_rad_s);
     monitor.on_phase(phase.phase());
@@ -223,6 +249,14 @@ UnbalanceFlight judge_unbalance(const RecordedFlight& flight, const UnbalancePar
   }
   result.duration_s = flight.rows.empty() ? 0.0 : flight.seconds_at(flight.rows.size() - 1);
   return result;
+}
+
+std::vector<std::array<double, 4>> amplitudes_by_second(const UnbalanceFlight& flight, double from_s,
+                                                        double to_s) {
+  std::vector<std::array<double, 4>> amplitudes;
+  for (int n = 0; from_s + n + 1.0 <= to_s; ++n)
+    amplitudes.push_back(flight.rms_amplitude_m_s2(from_s + n, from_s + n + 1.0));
+  return amplitudes;
 }
 
 void learn_baseline(std::span<const std::array<double, 4>> amplitudes_m_s2, UnbalanceParams& params) {

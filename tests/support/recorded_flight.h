@@ -18,8 +18,9 @@ struct RecordedRow {
   TimePoint time{};
   std::array<double, 3> accel_m_s2{};  ///< specific force
   std::array<double, 3> gyro_rad_s{};
-  std::array<double, 4> speed_rad_s{};
-  bool has_new_accel = true;  ///< false where the recorder repeats an older value
+  std::array<double, 4> speed_rad_s{};    ///< NaN where nothing measured it
+  std::array<double, 4> command_ratio{};  ///< NaN where it was not recorded
+  bool has_new_accel = true;              ///< false where the recorder repeats an older value
   bool has_new_speed = true;
 };
 
@@ -35,6 +36,8 @@ struct RecordedFlight {
 [[nodiscard]] RecordedFlight load_bebop(const std::filesystem::path& file);
 [[nodiscard]] RecordedFlight load_thrown(const std::filesystem::path& file);
 [[nodiscard]] RecordedFlight load_crazyflie(const std::filesystem::path& file);
+/// The flights of folder motor/: acceleration in axes of the world, which the level square flight nearly shares.
+[[nodiscard]] RecordedFlight load_crazypad(const std::filesystem::path& file);
 /// Every file of a set whose name begins so, by the loader, in the order of their names.
 [[nodiscard]] std::vector<RecordedFlight> load_all(const std::filesystem::path& folder,
                                                    RecordedFlight (*load)(const std::filesystem::path&),
@@ -62,14 +65,14 @@ struct UnbalanceFlight {
     std::array<double, 4> amplitude_m_s2{};
     std::array<double, 4> sigma_m_s2{};
     std::array<double, 4> log_odds{};
-    std::array<bool, 4> is_judged{};
+    std::array<bool, 4> is_judged{};  ///< by its phase
     double nis = 0.0;
     double noise_m_s2 = 0.0;
     std::array<double, 4> speed_error_ratio{};
   };
   std::vector<Report> reports;
   std::vector<double> ambiguities_s;
-  std::vector<Moment> moments;  ///< ten a second, while something is judged
+  std::vector<Moment> moments;  ///< ten a second, while something is judged by its phase
   double duration_s = 0.0;
   std::array<std::array<double, kReasons>, 4> seconds_by_reason{};  ///< per rotor
 
@@ -80,6 +83,10 @@ struct UnbalanceFlight {
 /// Flies a recording past the flight phase and the monitor, as the service would.
 [[nodiscard]] UnbalanceFlight judge_unbalance(const RecordedFlight& flight, const UnbalanceParams& params,
                                               const SpeedTelemetry& telemetry = {});
+
+/// The amplitudes in each second between two times.
+[[nodiscard]] std::vector<std::array<double, 4>> amplitudes_by_second(const UnbalanceFlight& flight,
+                                                                      double from_s, double to_s);
 
 /// The baseline of a vehicle from the amplitudes of several of its flights: their mean, and their scatter as sigma.
 /// Without two flights for every rotor there is none.

@@ -21,8 +21,11 @@ constexpr double kInertialStale_s = 1.0;
 constexpr double kLeastInformation = 0.5;  // 1σ of an amplitude over the smallest that is reported
 constexpr double kLeastGain = 0.25;        // of the sensors at hover speed, below which they are to blame
 constexpr double kLeak = 0.05;             // of another rotor's amplitude, that no sigma knows of
-constexpr double kConfounded = 0.5;        // correlation of two rotors' amplitudes
-constexpr double kMostLoad = 2.5;          // thrust by rotor speeds over weight, and its inverse
+// The growth of a rotor that turns apart by d rad/s leaks through a tracker of this time constant by 1/√(1 + (d·T)²).
+constexpr double kTrackerTime_s = 0.3;
+constexpr double kSpeedsSmoothed_s = 1.0;
+constexpr double kConfounded = 0.5;  // correlation of two rotors' amplitudes
+constexpr double kMostLoad = 2.5;    // thrust by rotor speeds over weight, and its inverse
 
 SignalPowerParams power_params(const UnbalanceParams& params) {
   SignalPowerParams power;
@@ -195,15 +198,18 @@ std::uint32_t RotorUnbalanceMonitor<N>::confounded_with(std::size_t rotor, bool 
 }
 
 template <std::size_t N>
+double RotorUnbalanceMonitor<N>::sensor_gain(double speed_rad_s) const noexcept {
+  return SensorResponse<double>{0.0, params_.low_pass_Hz}.sensor(speed_rad_s, window_s_).magnitude();
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
-  const double gain = [this] {
-    // What the sensors leave of the vibration at the mean speed; the high-pass is not theirs.
-    double speed = 0.0;
-    for (const double one : tracker_.speed_rad_s()) speed += one / static_cast<double>(N);
-    return SensorResponse<double>{0.0, params_.low_pass_Hz}.sensor(speed, window_s_).magnitude();
-  }();
+  double mean_speed = 0.0;
+  for (const double speed : tracker_.speed_rad_s()) mean_speed += speed / static_cast<double>(N);
+  const double gain = sensor_gain(mean_speed);
   // A running mean at first, so that the start at zero leaves no trace.
   estimated_s_ += dt_s;
+  note_speeds(dt_s);
   // What was seen while the tracker was at a loss must not linger.
   const double share = tracker_.explains() ? std::min(1.0, dt_s / std::min(estimated_s_, kSmoothing_s)) : 1.0;
   for (std::size_t k = 0; k < N; ++k) {
@@ -235,12 +241,27 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
 }
 
 template <std::size_t N>
-double RotorUnbalanceMonitor<N>::largest_but(std::size_t rotor) const noexcept {
-  double largest = 0.0;
+double RotorUnbalanceMonitor<N>::leaked_m_s2(std::size_t rotor) const noexcept {
+  double most = 0.0;
   for (std::size_t j = 0; j < N; ++j) {
-    if (j != rotor) largest = std::max(largest, rotor_[j].amplitude_m_s2);
+    if (j == rotor) continue;
+    const double apart2 = apart2_rad2_s2_[rotor][j] * kTrackerTime_s * kTrackerTime_s;
+    const double grown = std::abs(rotor_[j].growth_m_s2) / std::sqrt(1.0 + apart2);
+    most = std::max({most, kLeak * rotor_[j].amplitude_m_s2, grown});
   }
-  return largest;
+  return most;
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::note_speeds(double dt_s) noexcept {
+  const auto& speed = tracker_.speed_rad_s();
+  const double share = std::min(1.0, dt_s / std::min(estimated_s_, kSpeedsSmoothed_s));
+  for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t j = 0; j < N; ++j) {
+      const double apart = speed[i] - speed[j];
+      apart2_rad2_s2_[i][j] += share * (apart * apart - apart2_rad2_s2_[i][j]);
+    }
+  }
 }
 
 template <std::size_t N>
@@ -262,7 +283,7 @@ void RotorUnbalanceMonitor<N>::test_rotors(TimePoint now) noexcept {
   for (std::size_t i = 0; i < N; ++i) {
     RotorUnbalance& rotor = rotor_[i];
     const double doubt = kSigmas * rotor.growth_sigma_m_s2;
-    const double surely_grown = rotor.growth_m_s2 - doubt - kLeak * largest_but(i);
+    const double surely_grown = rotor.growth_m_s2 - doubt - leaked_m_s2(i);
     // A usual unbalance that nobody has measured is no growth.
     const double least =
         params_.has_baseline ? params_.smallest_m_s2 : params_.usual_m_s2 + params_.smallest_m_s2;
@@ -374,7 +395,9 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   fused_at_judgement_ = tracker_.counters().fused;
   const bool speeds_fail =
       reason == UnbalanceNotJudged::kSpeedUnknown || reason == UnbalanceNotJudged::kSpeedImplausible;
-  if (speeds_fail && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
+  // Where the sensors leave nothing of the vibration its power is that of the noise.
+  const bool power_is_felt = sensor_gain(hover_speed_rad_s(params_.vehicle)) >= kLeastGain;
+  if (speeds_fail && power_is_felt && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
     state_ = DetectorState::kMonitoring;
     judge_by_power(now, dt_s);
     return;

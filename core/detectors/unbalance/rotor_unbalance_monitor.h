@@ -46,19 +46,23 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
 
   void judge(TimePoint now) noexcept;
   void estimate(double dt_s) noexcept;
-  void test_rotors(TimePoint now) noexcept;
   void note_leader(const std::optional<typename Hypotheses::Verdict>& verdict) noexcept;
+  void test_rotors(TimePoint now) noexcept;
+  void note_speeds(double dt_s) noexcept;
   void test_ambiguity(TimePoint now, double log_odds_faulty) noexcept;
   void judge_by_power(TimePoint now, double dt_s) noexcept;
   void mute(UnbalanceNotJudged reason, TimePoint now) noexcept;
   [[nodiscard]] UnbalanceNotJudged reason_for_all(TimePoint now) const noexcept;
   [[nodiscard]] std::uint32_t confounded_with(std::size_t rotor, bool is_informed) const noexcept;
-  [[nodiscard]] double largest_but(std::size_t rotor) const noexcept;
+  /// The most that another rotor's amplitude may add to this one's.
+  [[nodiscard]] double leaked_m_s2(std::size_t rotor) const noexcept;
   /// Of the errors of two rotors' amplitudes, 0 to 1.
   [[nodiscard]] double correlation(std::size_t i, std::size_t j) const noexcept;
   /// Growth of a rotor together with those it cannot be told from.
   [[nodiscard]] double shared_growth_m_s2(std::size_t rotor) const noexcept;
   [[nodiscard]] bool speeds_carry_the_vehicle() const noexcept;
+  /// What the sensors leave of a vibration, 1 = all; the high-pass is not theirs.
+  [[nodiscard]] double sensor_gain(double speed_rad_s) const noexcept;
 
   UnbalanceParams params_;
   Tracker tracker_;
@@ -70,6 +74,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   double estimated_s_ = 0.0;
   std::array<FaultLifeCycle, N> life_;
   std::array<Held, N> grown_{};
+  std::array<std::array<double, N>, N> apart2_rad2_s2_{};  ///< mean square difference of speeds
   std::array<bool, N> leads_{};      ///< explains what is felt better than any other rotor, by log_lead
   bool somebody_has_grown_ = false;  ///< that does not lead
   std::array<bool, N> is_known_{};

@@ -84,9 +84,8 @@ struct UnbalanceInnovation {
 /// speeds of the rotors it falls back to the signal-power filter, core/detectors/unbalance/power_fallback.h.
 ///
 /// A rotor is reported when, for `persistence_s`, its growth over the baseline exceeds `smallest_m_s2` by two sigma
-/// while it is told apart from every other rotor and explains what is felt better than any other would, by `log_lead`:
-/// where two turn too alike the growth of one shows in the other's amplitude too. The sigma holds all that the rotors
-/// share. What is out of balance by `log_odds` but nobody's for `ambiguous_after_s` is reported as such, with the
+/// and what its neighbours may leak into it, while it is told apart from every other rotor and explains what is felt
+/// better than any other would, by `log_lead`; the sigma holds all that the rotors share. What is out of balance by `log_odds` but nobody's for `ambiguous_after_s` is reported as such, with the
 /// candidates. Judged in flight only.
 class UnbalanceMonitor {
  public:
