@@ -4,6 +4,7 @@
 #include <exception>
 #include <string_view>
 
+#include "cli/calibrate/effectiveness_command.h"
 #include "cli/calibrate/response_command.h"
 #include "cli/calibrate/unbalance_command.h"
 
@@ -15,6 +16,7 @@ using namespace airworthy::calibrate;
 int run(int argc, char** argv) {
   const std::string_view what = argc > 1 ? argv[1] : "";
   if (what == "unbalance") return calibrate_unbalance(argc - 1, argv + 1);
+  if (what == "effectiveness") return calibrate_effectiveness(argc - 1, argv + 1);
   if (what == "response") return calibrate_response(argc - 1, argv + 1);
   return calibrate_response(argc, argv);
 }

@@ -1,6 +1,7 @@
 #include "cli/eval/detectors.h"
 
 #include "core/assert.h"
+#include "services/effectiveness/effectiveness_service.h"
 #include "services/unbalance/unbalance_service.h"
 
 namespace airworthy::eval {
@@ -28,12 +29,16 @@ rt::Expected<ConfiguredDetector> load(const std::string& process, const std::str
 }  // namespace
 
 const std::vector<std::string>& detector_names() {
-  static const std::vector<std::string> names{"response", "unbalance"};
+  static const std::vector<std::string> names{"response", "effectiveness", "unbalance"};
   return names;
 }
 
 rt::Expected<ConfiguredDetector> load_detector(const std::string& name, const std::string& config_path,
                                                const std::vector<std::string>& overrides) {
+  if (name == "effectiveness") {
+    return load<effectiveness::EffectivenessConfig, effectiveness::EffectivenessService>(
+        "airworthy-effectiveness", config_path, overrides);
+  }
   AW_ASSERT(name == "unbalance");  // the command line was checked against detector_names()
   return load<unbalance::UnbalanceConfig, unbalance::UnbalanceService>("airworthy-unbalance", config_path,
                                                                        overrides);

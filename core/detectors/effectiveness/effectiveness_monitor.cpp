@@ -1,0 +1,378 @@
+#include "core/detectors/effectiveness/effectiveness_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace airworthy::effectiveness {
+namespace {
+
+constexpr double kGravity_m_s2 = 9.81;
+constexpr double kLongestStep_s = 0.03;  // a longer gap starts the prediction over
+constexpr double kFullLoss = 1.1;        // the largest share looked for: the model may be 10 % wrong
+constexpr double kLeastFullLoss = 0.5;   // and the smallest that counts towards a quick decision
+constexpr double kQuickMemory_s = 0.2;
+constexpr double kSlowMemory_s = 3.0;
+constexpr double kVarianceTime_s = 2.0;
+constexpr double kLeastVarianceRatio = 0.1;  // of the first guess
+constexpr double kMostVarianceRatio = 1000.0;
+constexpr double kMeanTime_s = 0.5;
+constexpr double kFirstDisturbance = 0.5;  // standard deviation at first, in shares of one rotor
+constexpr double kTiltInterval_s = 0.05;
+constexpr double kMappingPeriod_s = 1.0;
+constexpr double kMappingKeep = 0.98;  // a second: a mapping is learned within a minute
+constexpr double kBlow = 1.5;  // times all that all rotors give: no loss changes so much within a sample
+constexpr double kBlowSigmas = 8.0;
+constexpr double kLateralSlow_s = 0.5;
+constexpr double kLateralFast_s = 0.006;
+constexpr double kLateralVariance_s = 2.0;
+constexpr double kPush_m_s2 = 3.0;
+constexpr double kPushSigmas = 5.0;
+constexpr Duration kStruck{150'000};  // and what follows
+constexpr double kLeastRate_Hz = 150.0;
+constexpr Duration kLeastAge{4'000};    // of the evidence: a blow shows within a sample, a loss builds up
+constexpr double kSurelyPartial = 0.5;  // effectiveness that no lost propeller shows ...
+constexpr Duration kEarliestPartial{15'000};  // ... after so long
+constexpr double kCautious = 2.0;             // times the threshold near the ground
+
+std::array<LossRange<double>, kLossRanges> ranges_of(const EffectivenessParams& params) {
+  return {LossRange<double>{kLeastFullLoss, kFullLoss, kQuickMemory_s},
+          LossRange<double>{params.least_loss_ratio, kFullLoss, kSlowMemory_s}};
+}
+
+RotorLossParams<double> test_params_of(const EffectivenessParams& params) {
+  RotorLossParams<double> result;
+  result.threshold = loss_threshold(params.false_alarms_per_hour, params.samples_per_s,
+                                    kLossRanges * params.vehicle.rotor_count);
+  return result;
+}
+
+}  // namespace
+
+bool LateralForce::step(double accel_m_s2, double dt_s) noexcept {
+  const auto share = [dt_s](double time_s) { return dt_s / (time_s + dt_s); };
+  fast_m_s2_ += share(kLateralFast_s) * (accel_m_s2 - fast_m_s2_);
+  slow_m_s2_ += share(kLateralSlow_s) * (accel_m_s2 - slow_m_s2_);
+  const double push2 = (fast_m_s2_ - slow_m_s2_) * (fast_m_s2_ - slow_m_s2_);
+  const bool is_push = push2 > std::max(kPush_m_s2 * kPush_m_s2, kPushSigmas * kPushSigmas * variance_m2_s4_);
+  variance_m2_s4_ += share(kLateralVariance_s) * (std::min(push2, 9.0 * variance_m2_s4_) - variance_m2_s4_);
+  return is_push;
+}
+
+EffectivenessMonitor::EffectivenessMonitor(const EffectivenessParams& params) noexcept
+    : params_{params},
+      speeds_{params.speeds},
+      test_{params.vehicle.rotor_count, test_params_of(params), ranges_of(params)},
+      tilt_{params.vehicle.rotor_count, std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)} {
+  effectiveness_.fill(1.0);
+  const std::size_t n = params_.vehicle.rotor_count;
+  constexpr std::array kRows{kRollRow, kPitchRow, kVerticalRow};
+  double lift = 0.0;
+  for (std::size_t i = 0; i < n; ++i) lift -= params_.effectiveness.per_speed2[kVerticalRow][i];
+  const double hover_speed2 = kGravity_m_s2 / lift;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < n; ++i) {
+      authority_[axis] +=
+          std::abs(params_.effectiveness.per_speed2[kRows[axis]][i]) * hover_speed2 / static_cast<double>(n);
+    }
+  }
+  const Multirotor& vehicle = params_.vehicle;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto& hub = vehicle.rotor[i].position_m;
+    const auto& axis = vehicle.rotor[i].thrust_axis;
+    const double per_speed =
+        vehicle.propeller_radius_m > 0.0 ? vehicle.inflow_ratio / vehicle.propeller_radius_m : 0.0;
+    inflow_per_rate_[i] = {per_speed * (hub[1] * axis[2] - hub[2] * axis[1]),
+                           per_speed * (hub[2] * axis[0] - hub[0] * axis[2])};
+    vertical_at_imu_[i] = params_.effectiveness.per_speed2[kVerticalRow][i] +
+                          params_.effectiveness.per_speed2[kRollRow][i] * vehicle.imu_position_m[1] -
+                          params_.effectiveness.per_speed2[kPitchRow][i] * vehicle.imu_position_m[0];
+  }
+  hover_speed_sum_ = std::sqrt(hover_speed2) * static_cast<double>(n);
+  timing_error_s_ =
+      params_.noise.latency_error_s + params_.noise.lag_error_ratio * params_.speeds.time_constant_s;
+  const auto adaptive = [](double sigma) {
+    const double guess = sigma * sigma;
+    return AdaptiveVariance<double>{guess, kLeastVarianceRatio * guess, kMostVarianceRatio * guess,
+                                    kVarianceTime_s};
+  };
+  for (auto& variance : gyro_variance_) variance = adaptive(params_.noise.gyro_rad_s);
+  accel_variance_ = adaptive(params_.noise.accel_m_s2);
+}
+
+double EffectivenessMonitor::gyro_sigma(std::size_t axis) const noexcept {
+  return std::sqrt(gyro_variance_[axis].value);
+}
+
+double EffectivenessMonitor::accel_sigma() const noexcept { return std::sqrt(accel_variance_.value); }
+
+std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2,
+                                                      const std::array<double, 3>& gyro_rad_s,
+                                                      Phase phase) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!std::isfinite(accel_m_s2[i]) || !std::isfinite(gyro_rad_s[i])) {
+      ++dropped_;
+      return std::nullopt;
+    }
+  }
+  if (last_imu_ && time <= *last_imu_) {
+    ++times_gone_back_;
+    return std::nullopt;
+  }
+  last_imu_ = time;
+  if (waiting_count_ == kWaiting) {
+    waiting_first_ = (waiting_first_ + 1) % kWaiting;
+    --waiting_count_;
+    ++dropped_;
+  }
+  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {time, accel_m_s2, gyro_rad_s, phase};
+  ++waiting_count_;
+  return process(time);
+}
+
+void EffectivenessMonitor::on_report(LandedReport report) noexcept {
+  reported_in_air_ = report == LandedReport::kInAir;
+}
+
+std::optional<LossEvent> EffectivenessMonitor::on_speeds(TimePoint time,
+                                                         std::span<const double> speed_rad_s) noexcept {
+  speeds_.on_speed(time, speed_rad_s);
+  return process(time);
+}
+
+std::optional<LossEvent> EffectivenessMonitor::on_commands(TimePoint time,
+                                                           std::span<const double> command_ratio) noexcept {
+  speeds_.on_command(time, command_ratio);
+  return process(time);
+}
+
+std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
+  std::optional<LossEvent> event;
+  const TimePoint known = std::max(speeds_.known_until(), now - params_.most_wait);
+  while (waiting_count_ > 0 && !event) {
+    const Inertial& sample = waiting_[waiting_first_];
+    if (sample.time > known) break;
+    event = step(sample, now);
+    waiting_first_ = (waiting_first_ + 1) % kWaiting;
+    --waiting_count_;
+  }
+  return event;
+}
+
+void EffectivenessMonitor::watch_input(const Inertial& sample, double dt_s) noexcept {
+  mean_step_s_ += 0.01 * (std::min(dt_s, kLongestStep_s) - mean_step_s_);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (lateral_[axis].step(sample.accel_m_s2[axis], dt_s)) struck_ = sample.time;
+  }
+}
+
+bool EffectivenessMonitor::is_blow(const MotionSample<double>& motion) const noexcept {
+  const auto exceeds = [](const AxisInnovation<double>& axis, double most) {
+    return std::abs(axis.innovation) > most + kBlowSigmas * std::sqrt(axis.variance);
+  };
+  std::array<double, 3> all{};
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) all[axis] += std::abs(motion.contribution[i][axis]);
+  }
+  return exceeds(motion.rate[0], kBlow * motion.rate[0].dt_s * all[0]) ||
+         exceeds(motion.rate[1], kBlow * motion.rate[1].dt_s * all[1]) ||
+         exceeds(motion.vertical, kBlow * all[2]);
+}
+
+Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
+  if (lost_) return Muted::kRotorLost;
+  // Where the autopilot is sure to be in the air, signs of the ground may be an updraught: a lost rotor is
+  // still looked for.
+  const bool may_land = sample.phase == Phase::kLanding;
+  cautious_ = may_land && reported_in_air_ && in_flight_since_;
+  if (sample.phase != Phase::kInFlight && !may_land) in_flight_since_.reset();
+  if (sample.phase != Phase::kInFlight && !cautious_) return Muted::kPhase;
+  if (mean_step_s_ > 1.0 / kLeastRate_Hz) return Muted::kTooSlow;
+  if (struck_ && sample.time - *struck_ < kStruck) return Muted::kStruck;
+  using Telemetry = RotorSpeedPredictor<double>::Telemetry;
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    const Telemetry state = speeds_.telemetry(i, sample.time);
+    if (state == Telemetry::kGood) continue;
+    muted_rotor_ = i;
+    return Muted::kTelemetry;
+  }
+  if (!in_flight_since_) in_flight_since_ = sample.time;
+  if (mapping_ == Mapping::kWrongNumbers) return Muted::kRotorMapping;
+  if (sample.time - *in_flight_since_ < params_.settle) return Muted::kSettling;
+  return mapping_was_plausible_ || params_.mapping_is_known ? Muted::kNot : Muted::kMappingUnknown;
+}
+
+void EffectivenessMonitor::start(const Inertial& sample) noexcept {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double sigma = kFirstDisturbance * authority_[axis];
+    rate_[axis].start(sample.gyro_rad_s[axis], gyro_variance_[axis].value, sigma * sigma);
+  }
+  const double sigma = kFirstDisturbance * authority_[2];
+  vertical_.start(sigma * sigma);
+  mean_vertical_m_s2_ = -kGravity_m_s2;
+  test_.reset();
+}
+
+void EffectivenessMonitor::watch_mapping(const Inertial& sample, double dt_s) noexcept {
+  if (dt_s > kLongestStep_s) tilt_.interrupt();
+  tilt_.add(dt_s, speeds_.speeds(), sample.gyro_rad_s, sample.accel_m_s2[2]);
+  mapping_age_s_ += dt_s;
+  if (mapping_age_s_ < kMappingPeriod_s) return;
+  mapping_age_s_ = 0.0;
+  if (mapping_ == Mapping::kWrongNumbers) return;
+  mapping_ = RotorMapping<double>::judge(tilt_, params_.effectiveness);
+  mapping_was_plausible_ = mapping_was_plausible_ || mapping_ == Mapping::kPlausible;
+  tilt_.fade(kMappingKeep);
+}
+
+MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, double dt_s) noexcept {
+  const ModelNoise& noise = params_.noise;
+  const auto& B = params_.effectiveness.per_speed2;
+  MotionSample<double> motion;
+  motion.time = sample.time;
+  std::array<double, 3> u{};
+  std::array<double, 3> timing_variance{};
+  double speed_sum = 0.0;
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    const double speed = speeds_.speed(i);
+    const double before = speed_before_[i];
+    speed_before_[i] = speed;
+    speed_sum += speed;
+    // A rotor that the turning body moves along its axis meets air that much faster.
+    const double inflow = inflow_per_rate_[i][0] * rate_[0].rate() + inflow_per_rate_[i][1] * rate_[1].rate();
+    // A rate answers to the mean over the step, a force to its end.
+    const double mean = std::max(0.0, 0.5 * (speed * speed + before * before) - speed * inflow);
+    const double now = std::max(0.0, speed * (speed - inflow));
+    const double late = std::abs(speed * speed - before * before) / dt_s * timing_error_s_;
+    const std::array b{effectiveness_[i] * B[kRollRow][i], effectiveness_[i] * B[kPitchRow][i],
+                       effectiveness_[i] * vertical_at_imu_[i]};
+    motion.contribution[i] = {b[0] * mean, b[1] * mean, b[2] * now};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      u[axis] += motion.contribution[i][axis];
+      timing_variance[axis] += b[axis] * b[axis] * late * late;
+    }
+  }
+  const auto& inertia = params_.vehicle.inertia_kg_m2;
+  const auto& w = sample.gyro_rad_s;
+  if (inertia[0] > 0.0 && inertia[1] > 0.0) {
+    u[0] += (inertia[1] - inertia[2]) / inertia[0] * w[1] * w[2];
+    u[1] += (inertia[2] - inertia[0]) / inertia[1] * w[0] * w[2];
+  }
+  const auto square = [](double value) { return value * value; };
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double net = u[axis] + rate_[axis].disturbance();
+    const double variance = square(noise.acceleration_ratio * authority_[axis]) +
+                            square(noise.gain_error_ratio * net) + timing_variance[axis];
+    motion.rate[axis] = rate_[axis].step(
+        dt_s, u[axis], sample.gyro_rad_s[axis],
+        {2.0 * variance * noise.correlation_s, square(noise.disturbance_ratio_per_sqrt_s * authority_[axis])},
+        gyro_variance_[axis].value);
+    gyro_variance_[axis].step(motion.rate[axis].innovation, motion.rate[axis].variance, dt_s);
+  }
+  // The accelerometer beside the centre of mass also feels the body turn faster.
+  const auto& arm = params_.vehicle.imu_position_m;
+  u[2] += rate_[0].disturbance() * arm[1] - rate_[1].disturbance() * arm[0] +
+          w[2] * (w[0] * arm[0] + w[1] * arm[1]) - (w[0] * w[0] + w[1] * w[1]) * arm[2];
+  // What the air takes from the thrust grows with the speed of the rotors, not with its square.
+  const double speed_ratio = speed_sum / hover_speed_sum_;
+  mean_vertical_m_s2_ += dt_s / (kMeanTime_s + dt_s) * (u[2] - mean_vertical_m_s2_);
+  const double change = noise.gain_error_ratio * (u[2] - mean_vertical_m_s2_);
+  const double density = square(noise.vertical_ratio_per_sqrt_s * authority_[2]) +
+                         2.0 * (timing_variance[2] + square(change)) / noise.vertical_correlation_s;
+  motion.vertical = vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(),
+                                   sample.accel_m_s2[2], density, accel_variance_.value);
+  accel_variance_.step(motion.vertical.innovation, motion.vertical.variance, dt_s);
+  return motion;
+}
+
+std::optional<LossEvent> EffectivenessMonitor::step(const Inertial& sample, TimePoint now) noexcept {
+  if (!speeds_.advance(sample.time)) {
+    muted_ = Muted::kNoSpeeds;
+    return std::nullopt;
+  }
+  const Muted before = muted_;
+  const double dt_s = last_processed_ ? to_seconds(sample.time - *last_processed_) : 0.0;
+  watch_input(sample, dt_s);
+  muted_ = reason(sample);
+  last_processed_ = sample.time;
+  const auto runs = [](Muted muted) {
+    return muted == Muted::kNot || muted == Muted::kSettling || muted == Muted::kMappingUnknown;
+  };
+  if (runs(muted_) || muted_ == Muted::kRotorMapping) {
+    watch_mapping(sample, dt_s);
+  } else {
+    tilt_.interrupt();
+  }
+  if (!runs(muted_)) return std::nullopt;
+  if (!runs(before) || dt_s > kLongestStep_s) {
+    if (!runs(before)) {
+      start(sample);
+    } else {
+      for (std::size_t axis = 0; axis < 2; ++axis)
+        rate_[axis].resume(sample.gyro_rad_s[axis], gyro_variance_[axis].value);
+      test_.reset();
+    }
+    for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) speed_before_[i] = speeds_.speed(i);
+    return std::nullopt;
+  }
+  const MotionSample<double> motion = innovate(sample, dt_s);
+  if (is_blow(motion)) {
+    struck_ = sample.time;
+    test_.reset();
+    return std::nullopt;
+  }
+  if (muted_ != Muted::kNot) return std::nullopt;
+  judged_s_ += dt_s;
+  if (observer_ != nullptr) observer_(observer_context_, motion, now);
+  test_.step(motion);
+  return decide(motion, now);
+}
+
+bool EffectivenessMonitor::is_beyond_ground(const Test::Finding& finding) const noexcept {
+  return finding.range == 0 && finding.evidence >= kCautious * test_.threshold();
+}
+
+std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>& sample,
+                                                      TimePoint now) noexcept {
+  const auto finding = test_.finding();
+  if (!finding || (cautious_ && !is_beyond_ground(*finding))) return std::nullopt;
+  // Leaving the ground, thrust and drag change as if a little were lost.
+  if (finding->range != 0 && sample.time - *in_flight_since_ < params_.settle_partial) {
+    test_.reset();
+    return std::nullopt;
+  }
+  const Duration age = sample.time - finding->onset;
+  if (age < kLeastAge) return std::nullopt;
+  LossEvent event;
+  event.rotor = finding->rotor;
+  event.effectiveness = effectiveness_[event.rotor] * (1.0 - finding->loss);
+  event.sigma = effectiveness_[event.rotor] * std::sqrt(finding->loss_variance);
+  event.probability_lost = LossOfEffectivenessFilter<double>::probability_below(
+      params_.lost_below_ratio, event.effectiveness, event.sigma * event.sigma);
+  const bool is_lost = event.probability_lost > params_.lost_probability;
+  // The first milliseconds show less than is lost: filters of the sensor hold back what has just begun.
+  const bool is_partial = event.effectiveness > kSurelyPartial && age >= kEarliestPartial;
+  if (!is_lost && !is_partial && age < params_.most_classifying) return std::nullopt;
+  event.kind = event.probability_lost > 0.5 ? LossKind::kPropellerLost : LossKind::kPartialLoss;
+  event.evidence = finding->evidence;
+  event.second = finding->second;
+  event.unexplained = finding->unexplained;
+  event.onset = finding->onset;
+  event.sample = sample.time;
+  event.decided = now;
+  believe(event, *finding);
+  return event;
+}
+
+void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& finding) noexcept {
+  effectiveness_[event.rotor] = std::max(0.0, event.effectiveness);
+  if (event.kind == LossKind::kPropellerLost) {
+    lost_ = event.rotor;
+    muted_ = Muted::kRotorLost;
+  }
+  for (std::size_t axis = 0; axis < 2; ++axis)
+    rate_[axis].shift(finding.rate_shift[axis], finding.disturbance_shift[axis]);
+  vertical_.shift(finding.disturbance_shift[2]);
+  test_.reset();
+}
+
+}  // namespace airworthy::effectiveness

@@ -1,0 +1,197 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "core/detectors/effectiveness/rotor_loss_test.h"
+#include "core/detectors/effectiveness/rotor_mapping.h"
+#include "core/detectors/flight_phase.h"
+#include "core/estimators/effectiveness/control_regression.h"
+#include "core/estimators/effectiveness/disturbed_axis.h"
+#include "core/estimators/effectiveness/effectiveness_matrix.h"
+#include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
+#include "core/estimators/effectiveness/rotor_speed_predictor.h"
+
+namespace airworthy::effectiveness {
+
+/// A sudden great loss, and a smaller one that shows later.
+inline constexpr std::size_t kLossRanges = 2;
+
+/// How far the model may be wrong. Accelerations in shares of what one rotor gives in hover, so that the same
+/// numbers fit a vehicle of 39 g and one of 6 kg.
+struct ModelNoise {
+  double acceleration_ratio = 0.04;  ///< always there, correlated over `correlation_s`
+  double gain_error_ratio = 0.2;     ///< of the acceleration that the rotors give at this moment
+  double correlation_s = 0.01;
+  double vertical_correlation_s = 0.03;
+  double lag_error_ratio = 0.1;  ///< of the motors' time constant ...
+  double latency_error_s =
+      0.001;  ///< ... and of commands: speeds that change are known so much too late or early
+  double disturbance_ratio_per_sqrt_s = 0.1;  ///< gusts: how fast an outer moment or force wanders
+  double vertical_ratio_per_sqrt_s = 0.6;     ///< climbing changes the thrust of all rotors
+  double gyro_rad_s = 0.03;                   ///< first guess; adapts
+  double accel_m_s2 = 0.7;
+};
+
+struct EffectivenessParams {
+  Multirotor vehicle;
+  EffectivenessMatrix<double> effectiveness;  ///< of the vehicle file, or learned
+  RotorSpeedParams<double> speeds;
+  ModelNoise noise;
+  double false_alarms_per_hour = 1e-4;
+  double samples_per_s = 500.0;
+  double least_loss_ratio = 0.15;  ///< the smallest that is looked for
+  double lost_below_ratio = 0.3;   ///< effectiveness of what counts as lost
+  double lost_probability = 0.9;
+  bool mapping_is_known = false;       ///< as after a calibration: no need to wait for proof in flight
+  Duration most_wait{20'000};          ///< for the inputs that explain a sample
+  Duration settle{500'000};            ///< in flight before a great loss is looked for
+  Duration settle_partial{3'000'000};  ///< and before a partial one is
+  Duration most_classifying{
+      30'000};  ///< from the onset until what is not surely lost is called a partial loss
+};
+
+enum class Muted : std::uint8_t {
+  kNot,
+  kPhase,  ///< on ground, taking off, landing, contact
+  kSettling,
+  kStruck,   ///< pushed from the side, as no rotor can
+  kTooSlow,  ///< inertial data come less often than kLeastRate_Hz
+  kNoSpeeds,
+  kTelemetry,       ///< of one rotor implausible, frozen or missing
+  kMappingUnknown,  ///< nothing has yet shown that the rotors are numbered as described
+  kRotorMapping,    ///< the vehicle moves as if the rotors were numbered otherwise
+  kRotorLost,       ///< what is left cannot be judged
+};
+
+enum class LossKind : std::uint8_t { kPropellerLost, kPartialLoss };
+
+struct LossEvent {
+  LossKind kind = LossKind::kPartialLoss;
+  std::size_t rotor = 0;
+  double effectiveness = 1.0;
+  double sigma = 0.0;
+  double probability_lost = 0.0;
+  double evidence = 0.0;
+  double second = 0.0;
+  double unexplained = 0.0;
+  TimePoint onset{};    ///< estimated
+  TimePoint sample{};   ///< newest inertial sample that took part
+  TimePoint decided{};  ///< of the message with which it was decided
+};
+
+/// What pushes the vehicle along one axis in the rotor plane. A lost rotor does not.
+class LateralForce {
+ public:
+  /// Whether this sample shows a push: a change within some 10 ms, far beyond vibration.
+  bool step(double accel_m_s2, double dt_s) noexcept;
+
+ private:
+  double slow_m_s2_ = 0.0;
+  double fast_m_s2_ = 0.0;
+  double variance_m2_s4_ = 1.0;  ///< of the fast mean around the slow one
+};
+
+/// Finds rotors that give less thrust than they should. Feed it what arrives, in the order of arrival; it waits
+/// until speeds of the moment of each inertial sample are known. See docs/equations/effectiveness.md.
+class EffectivenessMonitor {
+ public:
+  using Test = RotorLossTest<double, kMaxRotors, kLossRanges>;
+
+  explicit EffectivenessMonitor(const EffectivenessParams& params) noexcept;
+
+  /// Phase as known at the time of the sample.
+  std::optional<LossEvent> on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2,
+                                  const std::array<double, 3>& gyro_rad_s, Phase phase) noexcept;
+  /// The autopilot's opinion, where it has one.
+  void on_report(LandedReport report) noexcept;
+  std::optional<LossEvent> on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept;
+  std::optional<LossEvent> on_commands(TimePoint time, std::span<const double> command_ratio) noexcept;
+
+  /// Shows every sample that is judged, before the judgement: for evaluation.
+  using Observer = void (*)(void* context, const MotionSample<double>& sample, TimePoint now);
+  void observe(Observer observer, void* context) noexcept {
+    observer_ = observer;
+    observer_context_ = context;
+  }
+
+  [[nodiscard]] Muted muted() const noexcept { return muted_; }
+  [[nodiscard]] std::size_t muted_rotor() const noexcept { return muted_rotor_; }
+  [[nodiscard]] const Test& test() const noexcept { return test_; }
+  [[nodiscard]] const RotorSpeedPredictor<double>& speeds() const noexcept { return speeds_; }
+  [[nodiscard]] double gyro_sigma(std::size_t axis) const noexcept;
+  [[nodiscard]] double accel_sigma() const noexcept;
+  /// What the model now takes for rotor i: 1, or what was found.
+  [[nodiscard]] double effectiveness(std::size_t i) const noexcept { return effectiveness_[i]; }
+  [[nodiscard]] std::optional<std::size_t> lost_rotor() const noexcept { return lost_; }
+  [[nodiscard]] Mapping mapping() const noexcept { return mapping_; }
+  [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
+  [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
+  [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
+
+ private:
+  struct Inertial {
+    TimePoint time;
+    std::array<double, 3> accel_m_s2;
+    std::array<double, 3> gyro_rad_s;
+    Phase phase;
+  };
+  static constexpr std::size_t kWaiting = 64;
+
+  std::optional<LossEvent> process(TimePoint now) noexcept;
+  std::optional<LossEvent> step(const Inertial& sample, TimePoint now) noexcept;
+  [[nodiscard]] Muted reason(const Inertial& sample) noexcept;
+  [[nodiscard]] bool is_blow(const MotionSample<double>& motion) const noexcept;
+  void watch_input(const Inertial& sample, double dt_s) noexcept;
+  void start(const Inertial& sample) noexcept;
+  void watch_mapping(const Inertial& sample, double dt_s) noexcept;
+  [[nodiscard]] MotionSample<double> innovate(const Inertial& sample, double dt_s) noexcept;
+  [[nodiscard]] bool is_beyond_ground(const Test::Finding& finding) const noexcept;
+  std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
+  void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
+
+  EffectivenessParams params_;
+  RotorSpeedPredictor<double> speeds_;
+  Test test_;
+  std::array<RateAxis<double>, 2> rate_;
+  ForceAxis<double> vertical_;
+  std::array<AdaptiveVariance<double>, 2> gyro_variance_;
+  AdaptiveVariance<double> accel_variance_;
+  std::array<double, 3> authority_{};  ///< acceleration that one rotor gives in hover
+  std::array<double, kMaxRotors> effectiveness_{};
+  std::array<double, kMaxRotors> speed_before_{};
+  std::array<std::array<double, 2>, kMaxRotors> inflow_per_rate_{};
+  std::array<double, kMaxRotors> vertical_at_imu_{};
+  double hover_speed_sum_ = 1.0;
+  double timing_error_s_ = 0.0;
+  double mean_vertical_m_s2_ = 0.0;  ///< that the rotors give, slow
+
+  std::array<Inertial, kWaiting> waiting_{};
+  std::size_t waiting_first_ = 0;
+  std::size_t waiting_count_ = 0;
+  std::optional<TimePoint> last_imu_;
+  std::optional<TimePoint> last_processed_;
+  std::optional<TimePoint> in_flight_since_;
+  std::optional<std::size_t> lost_;
+  std::array<LateralForce, 2> lateral_;
+  std::optional<TimePoint> struck_;
+  double mean_step_s_ = 0.0;
+  ControlRegression<double> tilt_;
+  Mapping mapping_ = Mapping::kUnknown;
+  bool mapping_was_plausible_ = false;
+  double mapping_age_s_ = 0.0;
+  Observer observer_ = nullptr;
+  void* observer_context_ = nullptr;
+  bool reported_in_air_ = false;
+  bool cautious_ = false;  ///< perhaps touching the ground
+  Muted muted_ = Muted::kNoSpeeds;
+  std::size_t muted_rotor_ = 0;
+  double judged_s_ = 0.0;
+  std::int64_t times_gone_back_ = 0;
+  std::int64_t dropped_ = 0;
+};
+
+}  // namespace airworthy::effectiveness

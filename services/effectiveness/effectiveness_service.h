@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "airworthy/esc_status_t.hpp"
+#include "airworthy/flight_state_t.hpp"
+#include "airworthy/imu_t.hpp"
+#include "airworthy/rotor_command_t.hpp"
+#include "core/detectors/effectiveness/effectiveness_monitor.h"
+#include "runtime/detector/fault_reporter.h"
+#include "runtime/phase/flight_phase_input.h"
+#include "runtime/process/node.h"
+#include "services/effectiveness/effectiveness_config.h"
+
+namespace airworthy::effectiveness {
+
+/// Moves messages between the bus and the effectiveness monitor, and runs the filter of every rotor's effectiveness
+/// beside it for the status. No arithmetic but of units.
+class EffectivenessService {
+ public:
+  EffectivenessService(rt::Node& node, const EffectivenessConfig& config);
+
+  EffectivenessService(const EffectivenessService&) = delete;
+  EffectivenessService& operator=(const EffectivenessService&) = delete;
+
+ private:
+  void on_imu(const imu_t& message);
+  void on_esc_status(const esc_status_t& message);
+  void on_rotor_command(const rotor_command_t& message);
+  void estimate(TimePoint time, const imu_t& message);
+  void handle(const std::optional<LossEvent>& event);
+  [[nodiscard]] rt::DetectorReport report();
+  [[nodiscard]] std::string muted_reason() const;
+
+  rt::Node& node_;
+  const EffectivenessConfig& config_;
+  rt::FlightPhaseInput phase_;
+  EffectivenessMonitor monitor_;
+  LossOfEffectivenessFilter<double> filter_;
+  std::optional<TimePoint> last_filtered_;
+  std::optional<TimePoint> last_imu_;
+  TimePoint tick_{};
+  std::array<std::optional<LossKind>, kMaxRotors> raised_{};
+  rt::FaultReporter reporter_;
+};
+
+}  // namespace airworthy::effectiveness

@@ -1,0 +1,135 @@
+#include "cli/calibrate/effectiveness_learning.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "sim/simulation.h"
+
+namespace airworthy::calibrate {
+namespace {
+
+using ::testing::HasSubstr;
+
+TimePoint at(double time_s) { return from_us(1'000'000) + Duration{std::llround(time_s * 1e6)}; }
+
+/// Keeps what a simulated vehicle sends while it flies.
+class Recorder final : public sim::Output {
+ public:
+  explicit Recorder(std::size_t rotors) : rotors_{rotors} {}
+
+  void on_truth(const sim::Truth&) override {}
+  void on_imu(const sim::ImuSample& sample) override {
+    if (sample.time_s < 7.0) return;
+    recording.in_flight.push_back({at(sample.time_s),
+                                   {sample.accel_m_s2.x(), sample.accel_m_s2.y(), sample.accel_m_s2.z()},
+                                   {sample.gyro_rad_s.x(), sample.gyro_rad_s.y(), sample.gyro_rad_s.z()}});
+  }
+  void on_esc(const sim::EscSample& sample) override {
+    EffectivenessRecording::PerRotor speeds{at(sample.time_s), {}};
+    for (std::size_t i = 0; i < rotors_; ++i) speeds.value[i] = sample.speed_rpm[i] * std::numbers::pi / 30.0;
+    recording.speeds.push_back(speeds);
+  }
+  void on_attitude(const sim::AutopilotSample&) override {}
+  void on_commands(const sim::AutopilotSample& sample) override {
+    recording.commands.push_back({at(sample.time_s), sample.control.command_ratio});
+  }
+  void on_flight_state(const sim::AutopilotSample&, sim::LandedState) override {}
+
+  EffectivenessRecording recording;
+
+ private:
+  std::size_t rotors_;
+};
+
+struct Flown {
+  EffectivenessRecording recording;
+  Multirotor vehicle;  ///< what really flew
+};
+
+effectiveness::EffectivenessConfig quad_config() {
+  auto config = effectiveness::EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml", {});
+  EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
+  return *config;
+}
+
+Flown fly(const Multirotor& vehicle, sim::Manoeuvre manoeuvre, sim::Level level, std::uint64_t seed) {
+  sim::Scenario scenario;
+  scenario.segments = {{.manoeuvre = sim::Manoeuvre::kGround, .duration_s = 1.5},
+                       {.manoeuvre = sim::Manoeuvre::kTakeOff, .duration_s = 4.0, .height_m = 3.0},
+                       {.manoeuvre = manoeuvre, .duration_s = 40.0}};
+  sim::Realism realism = sim::Realism::at(level);
+  realism.wind.mean_m_s = 1.0;
+  sim::Simulation simulation{vehicle, scenario, realism, seed};
+  Recorder recorder{vehicle.rotor_count};
+  while (simulation.time_s() < 45.0) simulation.step(recorder);
+  return {recorder.recording, simulation.vehicle()};
+}
+
+TEST(EffectivenessLearning, FindsGainsLagAndNoiseOfASimulatedVehicle) {
+  const auto config = quad_config();
+  for (const std::uint64_t seed : {3U, 8U}) {
+    const Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, seed);
+    const auto learned = learn_effectiveness({flown.recording}, config);
+    ASSERT_TRUE(learned.has_value()) << learned.error().text;
+    const Multirotor& nominal = config.monitor.vehicle;
+    const Multirotor& real = flown.vehicle;
+    const double thrust = real.thrust_coefficient_N_s2 / nominal.thrust_coefficient_N_s2;
+    // The truth has rotors that differ by 3 %, and turning rotors lose thrust to the air: the effective gain is lower.
+    EXPECT_NEAR(learned->axis[0].gain, thrust * nominal.inertia_kg_m2[0] / real.inertia_kg_m2[0], 0.15)
+        << seed;
+    EXPECT_NEAR(learned->axis[1].gain, thrust * nominal.inertia_kg_m2[1] / real.inertia_kg_m2[1], 0.15)
+        << seed;
+    EXPECT_NEAR(learned->axis[2].gain, thrust * nominal.mass_kg / real.mass_kg, 0.15) << seed;
+    EXPECT_GT(learned->axis[0].gain_sigma, 0.0);
+    EXPECT_LT(learned->axis[0].gain_sigma, 0.1);
+    EXPECT_NEAR(learned->motor_time_constant_s, nominal.motor_time_constant_s,
+                0.3 * nominal.motor_time_constant_s);
+    // 8 ms and 1.5 ms of mean jitter, seen from rates that are late themselves.
+    EXPECT_NEAR(learned->telemetry_latency_s, 0.008, 0.005);
+    EXPECT_GT(learned->gyro_noise_rad_s, 0.005);
+    EXPECT_LT(learned->gyro_noise_rad_s, 0.1);
+    EXPECT_GT(learned->smallest_loss_ratio, 0.02);
+    EXPECT_LT(learned->smallest_loss_ratio, 0.5);
+  }
+}
+
+TEST(EffectivenessLearning, RefusesAnAxisThatWasNotExcited) {
+  const auto config = quad_config();
+  Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, 3);
+  // Roll rates of another flight: nothing there goes with these rotors.
+  const Flown other = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, 4);
+  const std::size_t samples = std::min(flown.recording.in_flight.size(), other.recording.in_flight.size());
+  flown.recording.in_flight.resize(samples);
+  for (std::size_t i = 0; i < samples; ++i)
+    flown.recording.in_flight[i].gyro_rad_s[0] = other.recording.in_flight[i].gyro_rad_s[0];
+  const auto refused = learn_effectiveness({flown.recording}, config);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().text, HasSubstr("roll axis not excited"));
+  EXPECT_THAT(refused.error().text, ::testing::Not(HasSubstr("pitch axis")));
+  const auto kept = learn_effectiveness({flown.recording}, config, true);
+  ASSERT_TRUE(kept.has_value()) << kept.error().text;
+  EXPECT_EQ(kept->axis[0].gain, 1.0);
+  EXPECT_EQ(kept->axis[0].gain_sigma, kDescribedSigma);
+  EXPECT_NE(kept->axis[1].gain, 1.0);
+}
+
+TEST(EffectivenessLearning, RefusesTooLittleFlightAndMissingSpeeds) {
+  const auto config = quad_config();
+  Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kHover, sim::Level::kNominal, 1);
+  EffectivenessRecording mute = flown.recording;
+  mute.log = "mute.lcm";
+  mute.speeds.clear();
+  const auto without = learn_effectiveness({mute}, config);
+  ASSERT_FALSE(without.has_value());
+  EXPECT_EQ(without.error().text, "mute.lcm: no rotor speeds (ESC_STATUS)");
+  flown.recording.in_flight.resize(1000);
+  const auto brief = learn_effectiveness({flown.recording}, config);
+  ASSERT_FALSE(brief.has_value());
+  EXPECT_THAT(brief.error().text, HasSubstr("only 2.0 s of free flight"));
+}
+
+}  // namespace
+}  // namespace airworthy::calibrate

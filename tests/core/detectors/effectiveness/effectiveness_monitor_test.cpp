@@ -1,0 +1,184 @@
+#include "core/detectors/effectiveness/effectiveness_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tests/support/allocation_guard.h"
+
+namespace airworthy::effectiveness {
+namespace {
+
+constexpr double kStep_s = 0.002;
+constexpr double kHover_rad_s = 640.0;
+
+Multirotor quad() {
+  Multirotor vehicle;
+  vehicle.mass_kg = 0.5;
+  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
+  vehicle.thrust_coefficient_N_s2 = 0.5 * 9.81 / (4.0 * kHover_rad_s * kHover_rad_s);
+  vehicle.propeller_radius_m = 0.07;
+  vehicle.motor_time_constant_s = 0.02;
+  vehicle.speed_min_rad_s = 100.0;
+  vehicle.speed_max_rad_s = 1300.0;
+  vehicle.rotor_count = 4;
+  constexpr std::array<std::array<double, 2>, 4> kPlaces{
+      {{0.1, -0.1}, {0.1, 0.1}, {-0.1, 0.1}, {-0.1, -0.1}}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    vehicle.rotor[i].position_m = {kPlaces[i][0], kPlaces[i][1], 0.0};
+    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
+  }
+  return vehicle;
+}
+
+EffectivenessParams params() {
+  EffectivenessParams result;
+  result.vehicle = quad();
+  result.effectiveness = EffectivenessMatrix<double>::of(result.vehicle);
+  result.speeds = {
+      .rotor_count = 4, .time_constant_s = 0.02, .speed_min_rad_s = 100.0, .speed_max_rad_s = 1300.0};
+  result.mapping_is_known = true;
+  return result;
+}
+
+/// Hover of a body that answers exactly as described, with white noise of the sensors.
+class Hover {
+ public:
+  EffectivenessMonitor monitor{params()};
+  std::array<double, 4> effectiveness{1.0, 1.0, 1.0, 1.0};
+  std::array<double, 3> push_m_s2{};
+  Phase phase = Phase::kInFlight;
+  double step_s = kStep_s;
+  std::optional<LossEvent> event;
+
+  void fly(double seconds) {
+    const auto matrix = params().effectiveness.per_speed2;
+    for (double t = 0.0; t < seconds && !event; t += step_s) {
+      time_s_ += step_s;
+      std::array<double, 4> speed{};
+      double vertical = 0.0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        speed[i] = kHover_rad_s + 0.5 * normal_(random_);
+        const double thrust = effectiveness[i] * kHover_rad_s * kHover_rad_s;
+        for (std::size_t axis = 0; axis < 2; ++axis) rate_[axis] += step_s * matrix[axis][i] * thrust;
+        vertical += matrix[kVerticalRow][i] * thrust;
+      }
+      event = monitor.on_speeds(now(), speed);
+      if (event) return;
+      event = monitor.on_imu(now(),
+                             {push_m_s2[0] + 0.3 * normal_(random_), push_m_s2[1] + 0.3 * normal_(random_),
+                              vertical + push_m_s2[2] + 0.5 * normal_(random_)},
+                             {rate_[0] + 0.02 * normal_(random_), rate_[1] + 0.02 * normal_(random_), 0.0},
+                             phase);
+    }
+  }
+
+  [[nodiscard]] TimePoint now() const { return from_us(1'000'000 + std::llround(time_s_ * 1e6)); }
+
+ private:
+  double time_s_ = 0.0;
+  std::array<double, 2> rate_{};
+  std::mt19937 random_{17};
+  std::normal_distribution<> normal_;
+};
+
+TEST(EffectivenessMonitor, FindsEachRotorAndLatches) {
+  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
+    Hover hover;
+    hover.fly(5.0);
+    ASSERT_FALSE(hover.event);
+    ASSERT_EQ(hover.monitor.muted(), Muted::kNot);
+    hover.effectiveness[rotor] = 0.0;
+    const TimePoint onset = hover.now();
+    hover.fly(0.2);
+    ASSERT_TRUE(hover.event);
+    EXPECT_EQ(hover.event->rotor, rotor);
+    EXPECT_EQ(hover.event->kind, LossKind::kPropellerLost);
+    EXPECT_LT(hover.event->decided - onset, Duration{20'000});
+    EXPECT_LE(std::abs((hover.event->onset - onset).count()), 4'000);
+    EXPECT_EQ(hover.monitor.lost_rotor(), rotor);
+    EXPECT_EQ(hover.monitor.muted(), Muted::kRotorLost);
+    hover.event.reset();
+    hover.fly(1.0);
+    EXPECT_FALSE(hover.event) << "said once";
+  }
+}
+
+TEST(EffectivenessMonitor, ReadsWhatIsLeftAndThenWhatIsLost) {
+  Hover hover;
+  hover.fly(5.0);
+  hover.effectiveness[1] = 0.6;
+  hover.fly(1.0);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->kind, LossKind::kPartialLoss);
+  EXPECT_NEAR(hover.event->effectiveness, 0.6, 4.0 * hover.event->sigma + 0.02);
+  hover.event.reset();
+  hover.fly(3.0);
+  EXPECT_FALSE(hover.event) << "the model now expects it";
+  hover.effectiveness[1] = 0.0;
+  hover.fly(1.0);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->rotor, 1U);
+  EXPECT_EQ(hover.event->kind, LossKind::kPropellerLost);
+}
+
+TEST(EffectivenessMonitor, IsMutedWithAReason) {
+  Hover hover;
+  hover.phase = Phase::kTakeOff;
+  hover.effectiveness = {1.0, 1.0, 0.0, 1.0};
+  hover.fly(1.0);
+  EXPECT_FALSE(hover.event);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kPhase);
+  hover.effectiveness = {1.0, 1.0, 1.0, 1.0};
+  hover.phase = Phase::kInFlight;
+  hover.fly(0.2);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kSettling);
+  hover.fly(1.0);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
+  hover.push_m_s2 = {0.0, 8.0, 0.0};
+  hover.fly(0.05);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kStruck);
+  EXPECT_FALSE(hover.event);
+
+  Hover slow;
+  slow.step_s = 0.01;
+  slow.fly(5.0);
+  EXPECT_EQ(slow.monitor.muted(), Muted::kTooSlow);
+}
+
+TEST(EffectivenessMonitor, ABlowIsNoLoss) {
+  Hover hover;
+  hover.fly(5.0);
+  // Rates of a body that was hit: within one sample more than all rotors together give.
+  const double time_s = to_seconds(hover.now().time_since_epoch());
+  for (int i = 1; i <= 10; ++i) {
+    const TimePoint time = from_us(std::llround((time_s + i * kStep_s) * 1e6));
+    static_cast<void>(hover.monitor.on_speeds(time, std::array{640.0, 640.0, 640.0, 640.0}));
+    EXPECT_FALSE(hover.monitor.on_imu(time, {0.0, 0.0, 5.0}, {3.0 * i, -3.0 * i, 0.0}, Phase::kInFlight));
+  }
+}
+
+TEST(EffectivenessMonitor, RefusesWhatIsNoNumberAndTimesThatGoBack) {
+  Hover hover;
+  hover.fly(1.0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(hover.monitor.on_imu(hover.now() + Duration{2'000}, {0.0, nan, -9.8}, {}, Phase::kInFlight));
+  EXPECT_EQ(hover.monitor.samples_dropped(), 1);
+  EXPECT_FALSE(hover.monitor.on_imu(hover.now(), {0.0, 0.0, -9.8}, {}, Phase::kInFlight));
+  EXPECT_EQ(hover.monitor.times_gone_back(), 1);
+  hover.fly(3.0);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
+  EXPECT_FALSE(hover.event);
+}
+
+TEST(EffectivenessMonitor, UsesNoHeap) {
+  Hover hover;
+  const test::AllocationGuard guard;
+  hover.fly(2.0);
+  EXPECT_EQ(guard.allocations(), 0U);
+}
+
+}  // namespace
+}  // namespace airworthy::effectiveness

@@ -1,0 +1,126 @@
+#include "core/estimators/effectiveness/rotor_speed_predictor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/support/allocation_guard.h"
+
+namespace airworthy {
+namespace {
+
+using Predictor = RotorSpeedPredictor<double, 4>;
+using Telemetry = Predictor::Telemetry;
+
+constexpr double kLag_s = 0.02;
+
+TimePoint at(double time_s) { return from_us(1'000'000) + Duration{std::llround(time_s * 1e6)}; }
+
+RotorSpeedParams<double> params() {
+  return {.rotor_count = 3,
+          .time_constant_s = kLag_s,
+          .speed_min_rad_s = 100.0,
+          .speed_max_rad_s = 1100.0,
+          .command_latency = Duration{4'000},
+          .telemetry_latency = Duration{10'000}};
+}
+
+/// Steady state of a first-order lag driven by 600 + 200·sin(ωt).
+double lagged(double time_s, double rate_rad_s) {
+  const double gain = 1.0 / std::hypot(1.0, rate_rad_s * kLag_s);
+  return 600.0 + 200.0 * gain * std::sin(rate_rad_s * time_s - std::atan(rate_rad_s * kLag_s));
+}
+
+TEST(RotorSpeedPredictor, FollowsTheMotorBetweenLateReports) {
+  constexpr double kRate_rad_s = 15.0;
+  Predictor predictor{params()};
+  double worst = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    const double t = 0.002 * i;
+    if (i % 5 == 0) {
+      const double ratio = 0.5 + 0.2 * std::sin(kRate_rad_s * t);
+      predictor.on_command(at(t), std::array{ratio, 0.5, 0.5});
+      // What the motor turned at 10 ms ago, answering commands of 4 ms before that.
+      predictor.on_speed(at(t), std::array{lagged(t - 0.014, kRate_rad_s), 600.0, 600.0});
+    }
+    // Up to the present, 4 ms before the newest command reaches the motor.
+    ASSERT_TRUE(predictor.advance(at(t - 0.006)) || i < 5);
+    if (i > 500) worst = std::max(worst, std::abs(predictor.speed(0) - lagged(t - 0.010, kRate_rad_s)));
+  }
+  EXPECT_LT(worst, 4.0) << "of an amplitude of 190 rad/s; held reports would be 60 rad/s off";
+  EXPECT_NEAR(predictor.speed(1), 600.0, 1e-6);
+  EXPECT_EQ(predictor.staleness(), Duration{0});
+  EXPECT_TRUE(predictor.uses_commands());
+}
+
+TEST(RotorSpeedPredictor, LearnsTheScaleOfASaggingBattery) {
+  Predictor predictor{params()};
+  for (int i = 0; i < 5000; ++i) {
+    const double t = 0.002 * i;
+    if (i % 5 == 0) {
+      predictor.on_command(at(t), std::array{0.5, 0.5, 0.5});
+      predictor.on_speed(at(t), std::array{540.0, 600.0, 630.0});
+    }
+    static_cast<void>(predictor.advance(at(t)));
+  }
+  EXPECT_NEAR(predictor.speed(0), 540.0, 1.0);
+  EXPECT_NEAR(predictor.scale(0), 0.9, 0.005);
+  EXPECT_NEAR(predictor.scale(2), 1.05, 0.005);
+}
+
+TEST(RotorSpeedPredictor, WithoutCommandsInterpolatesReports) {
+  Predictor predictor{params()};
+  for (int i = 0; i < 20; ++i) predictor.on_speed(at(0.01 * i), std::array{600.0 + i, 600.0, 600.0});
+  ASSERT_TRUE(predictor.advance(at(0.125)));
+  EXPECT_NEAR(predictor.speed(0), 613.5, 1e-9)
+      << "halfway between the reports of 0.12 and 0.13 s, sent 10 ms later";
+  ASSERT_TRUE(predictor.advance(at(0.2)));
+  EXPECT_EQ(predictor.speed(0), 619.0);
+  EXPECT_EQ(predictor.staleness(), Duration{20'000});
+}
+
+TEST(RotorSpeedPredictor, RefusesWhatIsNoSpeed) {
+  Predictor predictor{params()};
+  const double nan = std::nan("");
+  for (int i = 0; i < 10; ++i) predictor.on_speed(at(0.01 * i), std::array{600.0, 600.0, nan});
+  EXPECT_EQ(predictor.telemetry(0, at(0.1)), Telemetry::kGood);
+  EXPECT_EQ(predictor.telemetry(2, at(0.1)), Telemetry::kMissing);
+  EXPECT_EQ(predictor.telemetry(0, at(1.0)), Telemetry::kMissing);
+  predictor.on_speed(at(0.1), std::array{5000.0, 600.0, 600.0});  // another unit
+  predictor.on_speed(at(0.11), std::array{10.0, 600.0, 600.0});   // a spike
+  EXPECT_EQ(predictor.refused_speeds(), 2);
+  predictor.on_speed(at(0.11), std::array{600.0, 600.0, 600.0});  // a duplicate
+  predictor.on_speed(at(0.05), std::array{600.0, 600.0, 600.0});  // late
+  predictor.on_command(at(0.1), std::array{0.5, nan, 0.5});
+  EXPECT_EQ(predictor.refused_messages(), 3);
+  // Three reports in a row that agree are no spike: a motor may stop, or run free.
+  for (int i = 12; i < 15; ++i) predictor.on_speed(at(0.01 * i), std::array{10.0, 600.0, 600.0});
+  ASSERT_TRUE(predictor.advance(at(0.2)));
+  EXPECT_EQ(predictor.speed(0), 10.0);
+}
+
+TEST(RotorSpeedPredictor, NoticesFrozenAndImplausibleTelemetry) {
+  Predictor predictor{params()};
+  for (int i = 0; i < 60; ++i) {
+    const double alive = 600.0 + i % 3;
+    predictor.on_speed(at(0.02 * i), std::array{600.0, alive, i % 2 == 0 ? alive : 9000.0});
+  }
+  EXPECT_EQ(predictor.telemetry(0, at(1.2)), Telemetry::kFrozen);
+  EXPECT_EQ(predictor.telemetry(1, at(1.2)), Telemetry::kGood);
+  EXPECT_EQ(predictor.telemetry(2, at(1.2)), Telemetry::kImplausible);
+}
+
+TEST(RotorSpeedPredictor, UsesNoHeap) {
+  const test::AllocationGuard guard;
+  Predictor predictor{params()};
+  for (int i = 0; i < 100; ++i) {
+    predictor.on_command(at(0.01 * i), std::array{0.5, 0.5, 0.5});
+    predictor.on_speed(at(0.01 * i), std::array{600.0, 600.0, 600.0});
+    static_cast<void>(predictor.advance(at(0.01 * i)));
+  }
+  EXPECT_EQ(guard.allocations(), 0U);
+}
+
+}  // namespace
+}  // namespace airworthy

@@ -1,0 +1,124 @@
+#include "services/effectiveness/effectiveness_service.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "airworthy/tick_t.hpp"
+#include "runtime/bus/channels.h"
+#include "runtime/bus/lcm_bus.h"
+#include "runtime/clock/manual_clock.h"
+#include "sim/output/log_output.h"
+#include "sim/simulation.h"
+
+namespace airworthy::effectiveness {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kOnset_s = 12.0;
+
+EffectivenessConfig quad_config() {
+  auto config = EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml", {});
+  EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
+  return *config;
+}
+
+/// A simulated quadrotor on an in-process bus, and the service listening.
+class EffectivenessServiceTest : public ::testing::Test {
+ protected:
+  EffectivenessServiceTest() {
+    observer_.subscribe<fault_event_t>(channel::kFaultEvent, [this](const fault_event_t& event) {
+      events_.push_back(event);
+      told_at_.push_back(clock_.now());
+    });
+    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
+                                           [this](const detector_status_t& status) { status_ = status; });
+  }
+
+  static sim::Scenario plan() {
+    sim::Scenario scenario;
+    scenario.segments = {{.manoeuvre = sim::Manoeuvre::kGround, .duration_s = 2.0},
+                         {.manoeuvre = sim::Manoeuvre::kTakeOff, .duration_s = 3.0, .height_m = 3.0},
+                         {.manoeuvre = sim::Manoeuvre::kRandom, .duration_s = 60.0}};
+    scenario.faults = {
+        {.kind = sim::FaultKind::kPropellerLost, .onset_s = kOnset_s, .rotor = 3, .magnitude = 1.0}};
+    return scenario;
+  }
+
+  void fly_until(double time_s) {
+    while (simulation_.time_s() < time_s) {
+      simulation_.step(output_);
+      while (*bus_->dispatch(100) > 0) {
+      }
+      clock_.advance_to(clock_.now() + Duration{2'000});
+    }
+  }
+
+  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
+  rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
+  rt::Log log_{"test", rt::LogLevel::kError};
+  EffectivenessConfig config_ = quad_config();
+  sim::LogOutput output_{*bus_, config_.vehicle, 4, 1};
+  sim::Simulation simulation_{config_.monitor.vehicle, plan(), sim::Realism::at(sim::Level::kHard), 3};
+  rt::Node observer_{*bus_, clock_, log_, {config_.vehicle, "observer", 4}};
+  rt::Node node_{*bus_, clock_, log_, {config_.vehicle, "airworthy-effectiveness", 5}};
+  EffectivenessService service_{node_, config_};
+  std::vector<fault_event_t> events_;
+  std::vector<TimePoint> told_at_;
+  detector_status_t status_;
+};
+
+TEST_F(EffectivenessServiceTest, NamesTheRotorThatLostItsPropeller) {
+  fly_until(1.8);
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMuted));
+  EXPECT_THAT(status_.muted_reason, HasSubstr("not in flight: on_ground"));
+
+  fly_until(kOnset_s);
+  EXPECT_TRUE(events_.empty());
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMonitoring)) << status_.muted_reason;
+  ASSERT_EQ(status_.components.size(), 4U);
+  EXPECT_EQ(status_.components[2].judged, 1);
+  EXPECT_EQ(status_.components[2].evidence.at(0).name, "effectiveness");
+  EXPECT_NEAR(status_.components[2].evidence.at(0).value, 1.0, 0.5);
+
+  fly_until(kOnset_s + 0.2);
+  ASSERT_FALSE(events_.empty());
+  const fault_event_t& event = events_[0];
+  EXPECT_EQ(event.phase, 1);
+  EXPECT_EQ(event.detector, "effectiveness");
+  EXPECT_EQ(event.component, "rotor 3");
+  EXPECT_EQ(event.fault_kind, "propeller_lost");
+  EXPECT_EQ(event.severity, 3);
+  EXPECT_EQ(event.latched, 1);
+  EXPECT_GT(event.probability, 0.5);
+  EXPECT_LT(event.magnitude, 0.35);
+  EXPECT_LE(event.onset_us, event.detected_us);
+  EXPECT_EQ(event.header.time_us, event.detected_us);
+  const double delay_s = to_seconds(from_us(event.detected_us) - sim::LogOutput::vehicle_time(kOnset_s));
+  EXPECT_GT(delay_s, 0.0);
+  EXPECT_LT(delay_s, 0.06);
+  // Told within the step of the message that decided.
+  EXPECT_LE(told_at_[0] - from_us(event.detected_us), Duration{2'000});
+  for (const fault_event_t& one : events_) EXPECT_EQ(one.component, "rotor 3");
+  ASSERT_EQ(status_.active.size(), 1U);
+  EXPECT_THAT(status_.muted_reason, HasSubstr("rotor 3 is lost"));
+  EXPECT_EQ(status_.components[0].judged, 0);
+}
+
+TEST_F(EffectivenessServiceTest, SilenceOfTheInertialUnitIsNotHealth) {
+  fly_until(10.0);
+  rt::Node gateway{*bus_, clock_, log_, {config_.vehicle, "airworthy-gateway", 9}};
+  auto ticks = gateway.advertise(channel::kTick);
+  for (int i = 0; i < 40; ++i) {
+    clock_.advance_to(clock_.now() + Duration{50'000});
+    tick_t tick{};
+    ticks.publish(tick, sim::LogOutput::vehicle_time(10.0 + 0.05 * i));
+    while (*bus_->dispatch(100) > 0) {
+    }
+  }
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMuted));
+  EXPECT_EQ(status_.muted_reason, "inertial data stale");
+}
+
+}  // namespace
+}  // namespace airworthy::effectiveness

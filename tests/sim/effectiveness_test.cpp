@@ -1,0 +1,149 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+#include "tests/sim/effectiveness_flights.h"
+#include "tests/sim/vehicles.h"
+
+namespace airworthy::sim {
+namespace {
+
+using effectiveness::Muted;
+
+EffectivenessFlight flight_of(const std::string& vehicle, std::uint64_t seed, Manoeuvre manoeuvre) {
+  EffectivenessFlight flight;
+  flight.vehicle = vehicle_named(vehicle);
+  flight.manoeuvre = manoeuvre;
+  flight.realism = Realism::at(Level::kHard);
+  flight.seed = seed;
+  return flight;
+}
+
+// docs/evidence_effectiveness.md has the same over 1200 flights.
+TEST(Effectiveness, NamesEveryLostPropellerOfEveryVehicleWithinTensOfMilliseconds) {
+  std::vector<double> delays_s;
+  for (std::size_t vehicle = 0; vehicle < kVehicles.size(); ++vehicle) {
+    for (const Manoeuvre manoeuvre : {Manoeuvre::kHover, Manoeuvre::kCircle, Manoeuvre::kRandom}) {
+      const std::uint64_t seed = 10 * vehicle + static_cast<std::uint64_t>(manoeuvre);
+      EffectivenessFlight flight = flight_of(kVehicles[vehicle], seed, manoeuvre);
+      flight.realism.wind.mean_m_s = 10.0 * static_cast<double>(seed % 4) / 3.0;
+      const std::size_t rotor = 1 + seed % flight.vehicle.rotor_count;
+      flight.fault = Fault{.kind = FaultKind::kPropellerLost,
+                           .onset_s = 10.0 + 0.041 * static_cast<double>(seed),
+                           .rotor = rotor,
+                           .magnitude = 1.0};
+      flight.duration_s = 20.0;
+      const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+      ASSERT_TRUE(outcome.was_judging) << kVehicles[vehicle] << " seed " << seed;
+      ASSERT_FALSE(outcome.ours.empty()) << kVehicles[vehicle] << " seed " << seed;
+      EXPECT_EQ(outcome.ours.front().rotor + 1, rotor) << kVehicles[vehicle] << " seed " << seed;
+      delays_s.push_back(outcome.ours.front().time_s - flight.fault->onset_s);
+      EXPECT_GT(delays_s.back(), 0.0) << kVehicles[vehicle] << " seed " << seed;
+    }
+  }
+  std::sort(delays_s.begin(), delays_s.end());
+  std::printf("%zu flights: delay %.1f ms median, %.1f ms at most\n", delays_s.size(),
+              1e3 * delays_s[delays_s.size() / 2], 1e3 * delays_s.back());
+  EXPECT_LT(delays_s[delays_s.size() / 2], 0.025);
+  EXPECT_LT(delays_s.back(), 0.060);
+}
+
+TEST(Effectiveness, StaysSilentThroughTakeOffsFlightsAndLandings) {
+  double flown_s = 0.0;
+  double judged_s = 0.0;
+  int take_offs = 0;
+  for (std::size_t vehicle = 0; vehicle < kVehicles.size(); ++vehicle) {
+    EffectivenessFlight flight = flight_of(kVehicles[vehicle], 77 + vehicle, Manoeuvre::kRandom);
+    flight.cycles = 4;
+    flight.duration_s = 15.0;
+    const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+    EXPECT_TRUE(outcome.ours.empty()) << kVehicles[vehicle];
+    flown_s += outcome.flown_s;
+    judged_s += outcome.judged_s;
+    take_offs += outcome.take_offs;
+  }
+  // Silence by being muted would be worth nothing.
+  EXPECT_GT(judged_s, 0.5 * flown_s);
+  EXPECT_GE(take_offs, 24);
+}
+
+TEST(Effectiveness, RotorsNumberedOtherwiseAreNoMotorFault) {
+  for (const char* name : {"unbalance_medium", "unbalance_hexa", "f450"}) {
+    EffectivenessFlight flight = flight_of(name, 5, Manoeuvre::kRandom);
+    flight.duration_s = 40.0;
+    const auto muted_with = [&](const Multirotor& described) {
+      auto params = effectiveness_params(described);
+      params.mapping_is_known = false;
+      const auto outcome = fly(flight, params);
+      EXPECT_TRUE(outcome.ours.empty()) << name;
+      return outcome.muted_in_flight;
+    };
+    EXPECT_EQ(muted_with(flight.vehicle), Muted::kNot) << name;
+    Multirotor swapped = flight.vehicle;
+    std::swap(swapped.rotor[0].position_m, swapped.rotor[1].position_m);
+    std::swap(swapped.rotor[0].spin, swapped.rotor[1].spin);
+    EXPECT_EQ(muted_with(swapped), Muted::kRotorMapping) << name;
+    Multirotor shifted = flight.vehicle;
+    std::rotate(shifted.rotor.begin(), shifted.rotor.begin() + 1,
+                shifted.rotor.begin() + static_cast<std::ptrdiff_t>(shifted.rotor_count));
+    EXPECT_EQ(muted_with(shifted), Muted::kRotorMapping) << name;
+    Multirotor mirrored = flight.vehicle;
+    for (Rotor& rotor : mirrored.rotor) rotor.position_m[1] = -rotor.position_m[1];
+    EXPECT_EQ(muted_with(mirrored), Muted::kRotorMapping) << name;
+    // The sense of rotation is not used: no fault, and nothing noticed.
+    Multirotor counter = flight.vehicle;
+    for (Rotor& rotor : counter.rotor) rotor.spin = -rotor.spin;
+    EXPECT_EQ(muted_with(counter), Muted::kNot) << name;
+  }
+}
+
+TEST(Effectiveness, TroubledMessagesAreNoMotorFault) {
+  for (const Mischief mischief : {Mischief::kDuplicates, Mischief::kGaps, Mischief::kSpikes}) {
+    EffectivenessFlight flight = flight_of("unbalance_medium", 9, Manoeuvre::kRandom);
+    flight.mischief = mischief;
+    flight.duration_s = 20.0;
+    const auto params = effectiveness_params(flight.vehicle);
+    const auto healthy = fly(flight, params);
+    EXPECT_TRUE(healthy.ours.empty()) << static_cast<int>(mischief);
+    EXPECT_GT(healthy.judged_s, 5.0) << static_cast<int>(mischief);
+    // And what is really lost is still found.
+    flight.fault = Fault{.kind = FaultKind::kPropellerLost, .onset_s = 10.3, .rotor = 2, .magnitude = 1.0};
+    const auto lost = fly(flight, params);
+    ASSERT_FALSE(lost.ours.empty()) << static_cast<int>(mischief);
+    EXPECT_EQ(lost.ours.front().rotor, 1U);
+    EXPECT_LT(lost.ours.front().time_s, 10.3 + 0.1);
+  }
+}
+
+TEST(Effectiveness, FrozenOrWrongTelemetryIsNamedAsTelemetry) {
+  for (const auto& [kind, magnitude] :
+       {std::pair{FaultKind::kTelemetryFrozen, 0.0}, std::pair{FaultKind::kTelemetryWrongUnit, 7.0}}) {
+    EffectivenessFlight flight = flight_of("unbalance_medium", 4, Manoeuvre::kRandom);
+    flight.fault = Fault{.kind = kind, .onset_s = 9.0, .rotor = 3, .magnitude = magnitude};
+    flight.duration_s = 20.0;
+    flight.give_up_s = 4.0;
+    const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+    EXPECT_TRUE(outcome.ours.empty()) << static_cast<int>(kind);
+    EXPECT_EQ(outcome.muted, Muted::kTelemetry) << static_cast<int>(kind);
+  }
+}
+
+TEST(Effectiveness, ReadsAPartialLoss) {
+  for (const double loss : {0.4, 0.6}) {
+    EffectivenessFlight flight = flight_of("bebop2", 3, Manoeuvre::kHover);
+    flight.fault = Fault{.kind = FaultKind::kPartialLoss, .onset_s = 9.0, .rotor = 4, .magnitude = loss};
+    flight.duration_s = 20.0;
+    const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+    ASSERT_FALSE(outcome.ours.empty());
+    EXPECT_EQ(outcome.ours.front().rotor, 3U);
+    EXPECT_EQ(outcome.ours.front().kind, effectiveness::LossKind::kPartialLoss);
+    // The vehicle's own inertia and thrust are wrong by 10 % and 7 %.
+    EXPECT_NEAR(outcome.ours.front().effectiveness, 1.0 - loss, 0.15);
+  }
+}
+
+}  // namespace
+}  // namespace airworthy::sim

@@ -1,0 +1,185 @@
+"""Evidence for the detector of lost effectiveness: simulated and recorded flights."""
+import collections
+import hashlib
+import os
+import pathlib
+import re
+
+from evidence_page import ROOT, Failed, build, circumstances, page, run
+
+PROGRAMS = ROOT / "build/dev/bin"
+LOST = ("lost", 0, 1200)
+LOSSES = ("0.1", "0.2", "0.3", "0.4", "0.6")
+PARTIAL_FLIGHTS = 40
+HEALTHY = {"flights": ("healthy", 0, 310, 2, 60), "landings": ("healthy", 5000, 24, 20, 10)}
+THROWS = ("00230 00257 00261 00266 00271 00276 00279 00340", "00232 00259 00264 00267 00273 00277 00281 00342")
+CRAZYFLIES = ("1", "2", "4")
+
+
+def flown(name, arguments):
+    """Lines of the simulated flights; kept beside the hash of the program, so that a broken run goes on."""
+    program = PROGRAMS / "effectiveness_evidence"
+    folder = ROOT / "build/evidence/effectiveness" / hashlib.sha256(program.read_bytes()).hexdigest()[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = folder / f"{name}.txt"
+    lines = kept.read_text().splitlines() if kept.exists() else []
+    if len(lines) < arguments[2]:
+        print(f"evidence: effectiveness {name}, {arguments[2]} flights", flush=True)
+        done = run(program, *arguments, capture_output=True)
+        if done.returncode != 0:
+            raise Failed(done.stderr)
+        kept.write_text(done.stdout)
+        lines = done.stdout.splitlines()
+    return [line.split() for line in lines[:arguments[2]]]
+
+
+def quantile(values, share):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(share * len(values)))]
+
+
+def delays(rows, rotor_column):
+    """Delays of right alarms, and how many flights were missed, alarmed before the fault, or blamed another rotor."""
+    right, missed, early, wrong = [], 0, 0, 0
+    for row in rows:
+        if row[rotor_column] == "-":
+            missed += 1
+        elif float(row[rotor_column + 1]) < 0:
+            early += 1
+        elif row[rotor_column] != row[3]:
+            wrong += 1
+        else:
+            right.append(float(row[rotor_column + 1]))
+    return right, missed, early, wrong
+
+
+def delay_row(name, rows, column):
+    right, missed, early, wrong = delays(rows, column)
+    numbers = " | ".join(f"{quantile(right, share):.0f}" for share in (0.5, 0.95, 0.99)) if right else "– | – | –"
+    return f"| {name} | {len(rows)} | {numbers} | {max(right, default=0):.0f} | {missed} | {early} | {wrong} |"
+
+
+def lost_lines(rows):
+    head = ["| flights | n | median ms | 95 % | 99 % | most | missed | before the fault | wrong rotor |",
+            "|---|--:|--:|--:|--:|--:|--:|--:|--:|"]
+    table = [delay_row("ours, all", rows, 6), delay_row("published filter, all", rows, 10)]
+    groups = collections.defaultdict(list)
+    for row in rows:
+        groups[row[1]].append(row)
+        groups[row[2]].append(row)
+    table += [delay_row(f"ours, {name}", group, 6) for name, group in groups.items()]
+    table += [delay_row(f"published filter, {name}", group, 10) for name, group in groups.items()]
+    kinds = collections.Counter(row[9] for row in rows)
+    judged = sum(row[5] == "1" for row in rows)
+    return head + table + ["", f"Judged at the onset: {judged} of {len(rows)} flights. First called a lost propeller: "
+                           f"{kinds['propeller_lost']}; a partial loss of at least half, for the time being: "
+                           f"{kinds['partial_loss']}."]
+
+
+def partial_lines():
+    lines = ["| loss | flights | found within 10 s | median ms | 95 % | mean | clairvoyant mean ms | ratio | wrong rotor | "
+             "before | k read, mean ± deviation | k true |", "|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]
+    for loss in LOSSES:
+        rows = flown(f"partial_{loss}", ("partial", 0, PARTIAL_FLIGHTS, loss))
+        right, missed, early, wrong = delays(rows, 6)
+        # The yardstick on the flights that ours found, or it would be compared with other flights.
+        known = [float(row[13]) for row in rows if row[6] == row[3] and row[13] != "-" and float(row[7]) >= 0]
+        read = [float(row[8]) for row in rows if row[6] == row[3]]
+        if not right:
+            lines.append(f"| {loss} | {len(rows)} | 0 | – | – | – | – | – | {wrong} | {early} | – | {1 - float(loss):.1f} |")
+            continue
+        mean, best = sum(right) / len(right), sum(known) / len(known)
+        centre = sum(read) / len(read)
+        spread = (sum((k - centre) ** 2 for k in read) / len(read)) ** 0.5
+        lines.append(f"| {loss} | {len(rows)} | {len(right)} | {quantile(right, .5):.0f} | {quantile(right, .95):.0f} | "
+                     f"{mean:.0f} | {best:.0f} | {mean / best:.2f} | {wrong} | {early} | {centre:.2f} ± {spread:.2f} | "
+                     f"{1 - float(loss):.1f} |")
+    return lines
+
+
+def healthy_lines():
+    lines = ["| flights | off the ground | judged | take-offs | false alarms, ours | published filter |",
+             "|---|--:|--:|--:|--:|--:|"]
+    found = []
+    for name, arguments in HEALTHY.items():
+        rows = flown(name, arguments)
+        total = [sum(float(row[i]) for row in rows) for i in range(3, 8)]
+        lines.append(f"| {name}: {len(rows)} of {arguments[3]} × {arguments[4]} s | {total[0] / 3600:.2f} h | "
+                     f"{total[1] / 3600:.2f} h | {total[2]:.0f} | {total[3]:.0f} | {total[4]:.0f} |")
+        found += [" ".join(row) for row in rows if len(row) > 8]
+    return lines + (["", "Every alarm (rotor @ s):", ""] + [f"- {line}" for line in found] if found else [])
+
+
+def evaluate(logs, options):
+    done = run(PROGRAMS / "airworthy-eval", *logs, "--detector", "effectiveness", "--config",
+               ROOT / "config/effectiveness.toml", *options, capture_output=True)
+    return [line for line in done.stdout.splitlines() if re.match(r"\S+ +(none|rotor)", line) and "of" not in line.split()]
+
+
+def recorded(folder):
+    """Healthy motion after calibration on other flights of the set; the ejection as the vehicle file describes it."""
+    data = pathlib.Path(os.environ.get("AIRWORTHY_DATA", ROOT / "../shared/data"))
+    if not data.is_dir():
+        return ["Recorded flights are not at hand here."]
+
+    def imported(source, name):
+        log = folder / f"{source.name.split('.')[0]}.lcm"
+        if run(PROGRAMS / "airworthy-import", "table", source, "--map", ROOT / f"config/import/{name}.toml", "-o", log,
+               capture_output=True).returncode != 0:
+            raise Failed(f"cannot import {source}")
+        return log
+
+    def calibrated(logs, options, name):
+        target = folder / f"{name}.toml"
+        done = run(PROGRAMS / "airworthy-calibrate", "effectiveness", *logs, "--config",
+                   ROOT / "config/effectiveness.toml", *options, "-o", target, capture_output=True)
+        if done.returncode != 0:
+            raise Failed(done.stderr)
+        return target, done.stdout.splitlines()
+
+    lines = ["```"]
+    vehicle = ["--set", f"vehicle={ROOT}/config/vehicles/indiflight_throw.toml"]
+    halves = [[imported(data / f"indiflight_throw/LOG{n}.csv.xz", "indiflight_throw") for n in half.split()]
+              for half in THROWS]
+    for judged, taught, name in ((0, 1, "odd"), (1, 0, "even")):
+        target, said = calibrated(halves[taught], vehicle, name)
+        lines += said + evaluate(halves[judged], [*vehicle, "--set", f"calibration={target}"])
+    vehicle = ["--set", f"vehicle={ROOT}/config/vehicles/crazyflie_brushless.toml", "--set", "input.imu_rate_Hz=100"]
+    runs = {n: imported(data / f"crazyflie_brushless_rpm/square_run{n}.csv.xz", "crazyflie_brushless_rpm")
+            for n in CRAZYFLIES}
+    for n, log in runs.items():
+        target, said = calibrated([other for m, other in runs.items() if m != n], vehicle, f"without_{n}")
+        lines += said[:1] + evaluate([log], [*vehicle, "--set", f"calibration={target}"])
+    vehicle = ["--set", f"vehicle={ROOT}/config/vehicles/bebop2.toml", "--set", "input.telemetry_latency_ms=0",
+               "--set", "input.rotor_mapping_checked=true"]
+    lines += evaluate([imported(data / "bebop2_prop_eject/flight01_11-43-10.csv.xz", "bebop2_prop_eject")], vehicle)
+    return lines + ["```"]
+
+
+def effectiveness(_):
+    for target in ("effectiveness_evidence", "airworthy-import", "airworthy-calibrate", "airworthy-eval"):
+        build("dev", target)
+    folder = ROOT / "build/evidence/effectiveness"
+    folder.mkdir(parents=True, exist_ok=True)
+    lost = flown("lost", LOST)
+    page("evidence_effectiveness.md", [
+        "# Lost propellers and partial losses", "",
+        "Written by `tools/evidence effectiveness`. Simulated at *hard* realism (`sim/realism.toml`: mass, inertia and thrust",
+        "wrong by 10 %, 10 % and 7 %, telemetry 8 to 11 ms late at 100 Hz), mean wind drawn from 0 to 10 m/s, all shipped",
+        "multirotors, hover, circle and random set-points in turn. The detector knows the vehicle file, latencies of 5 ms for",
+        "commands and 10 ms for telemetry, and that the rotors are numbered as described; one threshold, from 1e-4 false",
+        "alarms per hour. Delays count from the physical loss to the arrival of the message that decided, so that waiting for",
+        "commands and late telemetry is inside. Of the delay, 1 ms is the inertial unit's stamp and about 1.3 ms its low-pass.",
+        "The published filter gets the same synchronised speeds, for other than four rotors with a weak pull to 1 and the",
+        "reading of a single fault. Seeds are 1000 + number of the flight.", "", circumstances(), "",
+        "## A propeller comes off", "", *lost_lines(lost), "",
+        "## A part of the thrust is lost", "",
+        "Clairvoyant: a cumulative sum that knows rotor and size, on the same innovations, its threshold for the same rate of",
+        "false alarms; on the flights that ours found.", "", *partial_lines(), "",
+        "## Healthy flights", "", *healthy_lines(), "",
+        "## Recorded flights", "",
+        "Healthy throws, judged after a calibration on the other half of the set: free fall, 24 rad/s, impacts. The rules for",
+        "collisions were made on seeing alarms in two of them (LOG00230, LOG00340). The Crazyflie's",
+        "inertial data come 100 times a second over a radio link: below the 150 Hz that the detector asks for it is UNKNOWN,",
+        "which `silent` hides here. The Bebop throws off propeller 2 at 12.39 to 12.45 s. The simulated RflyMAD runs carry no",
+        "rotor speeds, without which the detector does not judge: they are not listed.", "", *recorded(folder)])
