@@ -92,18 +92,19 @@ def report(feed, rig, flight, speed):
 
 
 def calibrated(rig, seed):
-    """Flies the vehicle healthy, in other air, and lets the detectors learn it; returns the file for the unbalance detector."""
+    """Flies the vehicle healthy, in other air, and lets the detectors learn it; returns each one's calibration file."""
     print("demo: calibrating on a healthy flight")
-    log, calibration = rig.path / "healthy.lcm", rig.path / "unbalance_calibration.toml"
-    steps = ([rig.binaries / "airworthy-sim", "--vehicle", rig.config / VEHICLE, "--scenario", rig.config / HEALTHY,
-              "--vehicle-seed", seed, "--seed", seed + 1000, "--output", log],
-             [rig.binaries / "airworthy-calibrate", "unbalance", "--config", rig.config / "unbalance.toml", "--output",
-              calibration, log])
+    log = rig.path / "healthy.lcm"
+    files = {name: rig.path / f"{name}_calibration.toml" for name in ("unbalance", "effectiveness")}
+    steps = [[rig.binaries / "airworthy-sim", "--vehicle", rig.config / VEHICLE, "--scenario", rig.config / HEALTHY,
+              "--vehicle-seed", seed, "--seed", seed + 1000, "--output", log]]
+    steps += [[rig.binaries / "airworthy-calibrate", name, "--config", rig.config / f"{name}.toml", "--set",
+               f"vehicle={rig.config / VEHICLE}", "--output", file, log] for name, file in files.items()]
     for step in steps:
         done = subprocess.run([str(part) for part in step], capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(f"{done.stdout}{done.stderr}demo: the vehicle could not be calibrated")
-    return calibration
+    return files
 
 
 def run(given):
@@ -112,7 +113,9 @@ def run(given):
         if given.flight is None:
             calibration = calibrated(rig, given.seed)
             rig.start_gateway(config="demo/gateway.toml")
-            rig.start_service("airworthy-unbalance", "unbalance.toml", [f"calibration={calibration}"])
+            for name, file in calibration.items():
+                rig.start_service(f"airworthy-{name}", f"{name}.toml", [f"vehicle={rig.config / VEHICLE}", f"calibration={file}"])
+            rig.start_service("airworthy-actuator", "actuator.toml", [f"vehicle={rig.config / VEHICLE}"])
             rig.start_response([f"vehicle={rig.config / VEHICLE}"], config="response_multirotor.toml")
             rig.start_driver(config="demo/mavlink.toml")
             feed = flight_rig.Feed(rig.endpoint)

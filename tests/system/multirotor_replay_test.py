@@ -6,11 +6,12 @@ import time
 import unittest
 
 from recording import events, lost_messages, play_inputs, python_bindings, record
-from system_test import SystemTest, alive
+from system_test import SKIPPED, SystemTest, alive
 
 VEHICLE_FILE = "vehicles/unbalance_hexa.toml"
 VEHICLE = "hexa"
-DETECTORS = {"airworthy-unbalance": "unbalance.toml", "airworthy-actuator": "actuator.toml"}
+DETECTORS = {"airworthy-unbalance": "unbalance.toml", "airworthy-effectiveness": "effectiveness.toml",
+             "airworthy-actuator": "actuator.toml"}
 PATIENCE_S = 120
 
 
@@ -28,7 +29,7 @@ class MultirotorReplay(SystemTest):
         rig.start_driver(config="demo/mavlink.toml")
         up = feed.wait_for(lambda kind, document: kind == "health" and alive(document) >= {"airworthy-mavlink", *DETECTORS}, 20)
         self.assertIsNotNone(up, f"the system did not come up: {rig.dead()}")
-        flight = rig.start_simulation(VEHICLE_FILE, "scenarios/demo.toml", "--duration", 40)
+        flight = rig.start_simulation(VEHICLE_FILE, "scenarios/demo.toml", "--duration", 49)
         deadline = time.monotonic() + PATIENCE_S
         while flight.poll() is None and time.monotonic() < deadline:
             feed.poll(0.2)
@@ -55,19 +56,22 @@ class MultirotorReplay(SystemTest):
     def test_the_same_events_again(self):
         rig, live = self.fly()
         bindings = python_bindings(rig.path)
-        if lost_messages(live, VEHICLE) > 0:
+        lost = lost_messages(live, VEHICLE)
+        if lost > 0:
             # LCM's logger drops what it cannot take within some 40 ms: then live and replay saw different flights.
-            print(f"SKIPPED: lcm-logger lost {lost_messages(live, VEHICLE)} messages: this computer is too busy", file=sys.stderr)
-            sys.exit(77)
+            self.skipTest(f"lcm-logger lost {lost} messages: this computer is too busy")
         again = self.replay(live)
         print(f"lost on the way to the logger: live {lost_messages(live, VEHICLE)}, replay {lost_messages(again, VEHICLE)}")
         first, second = events(live, bindings, VEHICLE), events(again, bindings, VEHICLE)
         raised = {(component, kind) for _, phase, component, kind, *_ in first if phase == 1}
         print(f"{len(first)} events: {sorted(raised)}")
-        self.assertIn(("rotor 5", "unbalance"), raised)
+        self.assertLessEqual({("rotor 2", "unbalance"), ("rotor 3", "propeller_lost")}, raised)
         # Detectors are processes of their own: their events mix on the bus as it comes.
         self.assertEqual(sorted(first, key=repr), sorted(second, key=repr))
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    result = unittest.main(verbosity=2, exit=False).result
+    for _, reason in result.skipped:
+        print(f"SKIPPED: {reason}", file=sys.stderr)
+    sys.exit(1 if not result.wasSuccessful() else SKIPPED if result.skipped else 0)

@@ -19,10 +19,12 @@ class SimulatorTest(SystemTest):
         feed = self.feed(rig)
         rig.start_gateway(config="demo/gateway.toml")
         rig.start_response([f"vehicle={rig.config / 'vehicles/unbalance_hexa.toml'}"], config="response_multirotor.toml")
-        rig.start_service("airworthy-unbalance", "unbalance.toml")
+        for name in ("unbalance", "effectiveness", "actuator"):
+            rig.start_service(f"airworthy-{name}", f"{name}.toml", [f"vehicle={rig.config / 'vehicles/unbalance_hexa.toml'}"])
         rig.start_driver(config="demo/mavlink.toml")
         up = feed.wait_for(lambda kind, document: kind == "health" and alive(document) >= {
-            "airworthy-mavlink", "airworthy-response", "airworthy-unbalance"}, 20)
+            "airworthy-mavlink", "airworthy-response", "airworthy-unbalance", "airworthy-effectiveness",
+            "airworthy-actuator"}, 20)
         self.assertIsNotNone(up, f"the system did not come up: {rig.dead()}")
         flight = rig.start_simulation("vehicles/unbalance_hexa.toml", "scenarios/demo.toml", "--duration", 24)
         for phase in ("on_ground", "in_flight"):

@@ -54,9 +54,12 @@ class RotorSpeedPredictor {
     commands_.push(sample);
   }
 
-  /// NaN = not in this message.
+  /// NaN = not in this message. Links that report the rotors in groups may stamp all groups alike: what a message of the
+  /// newest time adds is joined to it.
   void on_speed(TimePoint time, std::span<const Scalar> speed_rad_s) noexcept {
-    if (speed_rad_s.size() != params_.rotor_count || !newer(speeds_, time)) return refuse();
+    if (speed_rad_s.size() != params_.rotor_count) return refuse();
+    if (speeds_.size > 0 && time == speeds_.newest().time) return join_newest(time, speed_rad_s);
+    if (!newer(speeds_, time)) return refuse();
     Sample sample{time, {}};
     bool any = false;
     for (std::size_t i = 0; i < params_.rotor_count; ++i) {
@@ -147,6 +150,7 @@ class RotorSpeedPredictor {
       return samples[(next + 2 * kHistory - 1 - age) % kHistory];
     }
     [[nodiscard]] const Sample& newest() const noexcept { return back(0); }
+    [[nodiscard]] Sample& newest() noexcept { return samples[(next + kHistory - 1) % kHistory]; }
 
     /// Linear between the samples around `time`, held beyond them; NaN values are skipped.
     [[nodiscard]] Scalar at(std::size_t i, TimePoint time) const noexcept {
@@ -177,6 +181,20 @@ class RotorSpeedPredictor {
     Scalar candidate = 0;
     Scalar refused_share = 0;
   };
+
+  void join_newest(TimePoint time, std::span<const Scalar> speed_rad_s) noexcept {
+    Sample& newest = speeds_.newest();
+    bool repeats = false;
+    for (std::size_t i = 0; i < params_.rotor_count; ++i) {
+      if (!std::isfinite(speed_rad_s[i])) continue;
+      if (std::isfinite(newest.value[i])) {
+        repeats = true;
+      } else if (accept(i, time, std::abs(speed_rad_s[i]))) {
+        newest.value[i] = std::abs(speed_rad_s[i]);
+      }
+    }
+    if (repeats) refuse();
+  }
 
   static bool newer(const Ring& ring, TimePoint time) noexcept {
     return ring.size == 0 || time > ring.newest().time;
@@ -225,7 +243,7 @@ class RotorSpeedPredictor {
     started_ = true;
     now_ = time;
     history_.size = history_.next = 0;
-    corrected_until_ = speeds_.newest().time;
+    corrected_until_.fill(speeds_.newest().time);
     for (std::size_t i = 0; i < params_.rotor_count; ++i) speed_[i] = reported(i, time);
   }
 
@@ -241,13 +259,13 @@ class RotorSpeedPredictor {
     for (std::size_t age = speeds_.size; age-- > 0;) {
       const Sample& sample = speeds_.back(age);
       const TimePoint measured = sample.time - params_.telemetry_latency;
-      if (sample.time <= corrected_until_ || measured > time || history_.size == 0) continue;
-      const Scalar since_s = static_cast<Scalar>(to_seconds(sample.time - corrected_until_));
-      corrected_until_ = sample.time;
-      const Scalar gain = since_s / (params_.correction_time_s + since_s);
-      const Scalar scale_gain = since_s / (params_.scale_time_s + since_s);
+      if (measured > time || history_.size == 0) continue;
       for (std::size_t i = 0; i < params_.rotor_count; ++i) {
-        if (!std::isfinite(sample.value[i])) continue;
+        if (!std::isfinite(sample.value[i]) || sample.time <= corrected_until_[i]) continue;
+        const Scalar since_s = static_cast<Scalar>(to_seconds(sample.time - corrected_until_[i]));
+        corrected_until_[i] = sample.time;
+        const Scalar gain = since_s / (params_.correction_time_s + since_s);
+        const Scalar scale_gain = since_s / (params_.scale_time_s + since_s);
         const Scalar error = sample.value[i] - history_.at(i, measured);
         const Scalar wanted = std::max(commands_.at(i, measured), params_.speed_max_rad_s / Scalar{10});
         speed_[i] = std::max(Scalar{0}, speed_[i] + gain * error);
@@ -264,7 +282,7 @@ class RotorSpeedPredictor {
   std::array<Scalar, kMost> speed_{};
   std::array<Scalar, kMost> scale_{};
   TimePoint now_{};
-  TimePoint corrected_until_{};
+  std::array<TimePoint, kMost> corrected_until_{};
   bool started_ = false;
   bool by_commands_ = false;
   std::int64_t refused_ = 0;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tests/support/allocation_guard.h"
@@ -67,6 +68,38 @@ TEST(RotorSpeedPredictor, LearnsTheScaleOfASaggingBattery) {
   EXPECT_NEAR(predictor.speed(0), 540.0, 1.0);
   EXPECT_NEAR(predictor.scale(0), 0.9, 0.005);
   EXPECT_NEAR(predictor.scale(2), 1.05, 0.005);
+}
+
+// MAVLink reports four rotors in one message and the rest in the next, with one time of the device.
+TEST(RotorSpeedPredictor, GroupsOfRotorsWithOneStampAreOneReport) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Predictor whole{params()};
+  Predictor grouped{params()};
+  for (int i = 0; i < 2000; ++i) {
+    const double t = 0.002 * i;
+    if (i % 5 == 0) {
+      const std::array speeds{540.0 + std::sin(3.0 * t), 600.0 + 5.0 * std::sin(t), 630.0 + std::cos(t)};
+      for (Predictor* predictor : {&whole, &grouped}) {
+        predictor->on_command(at(t), std::array{0.5, 0.5, 0.5});
+        static_cast<void>(predictor->advance(at(t)));
+      }
+      whole.on_speed(at(t), speeds);
+      grouped.on_speed(at(t), std::array{speeds[0], speeds[1], kNone});
+      // What is known already may be used before the other group comes.
+      static_cast<void>(grouped.advance(at(t)));
+      grouped.on_speed(at(t), std::array{kNone, kNone, speeds[2]});
+    }
+    for (Predictor* predictor : {&whole, &grouped}) static_cast<void>(predictor->advance(at(t + 0.001)));
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(grouped.telemetry(i, at(4.0)), Telemetry::kGood) << i;
+    EXPECT_NEAR(grouped.speed(i), whole.speed(i), 0.5) << i;
+    EXPECT_NEAR(grouped.scale(i), whole.scale(i), 2e-3) << i;
+  }
+  EXPECT_EQ(grouped.refused_messages(), 0);
+  grouped.on_speed(at(3.99), std::array{540.0, 600.0, 630.0});
+  grouped.on_speed(at(3.99), std::array{540.0, 600.0, 630.0});
+  EXPECT_GT(grouped.refused_messages(), 0) << "a duplicate adds nothing";
 }
 
 TEST(RotorSpeedPredictor, WithoutCommandsInterpolatesReports) {
