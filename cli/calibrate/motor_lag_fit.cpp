@@ -7,8 +7,8 @@ namespace airworthy::calibrate {
 namespace {
 
 constexpr double kShortest_s = 0.004;
-constexpr double kLongest_s = 0.12;
 constexpr double kLagStep = 1.15;  // ratio of neighbours in the grid
+constexpr int kLags = 25;          // up to 0.12 s
 constexpr double kDelayStep_s = 0.004;
 constexpr int kDelays = 16;
 constexpr double kLeastExplained = 0.02;
@@ -65,8 +65,10 @@ std::optional<MotorLagFit> fit_motor_lag(const std::vector<Series>& commands,
                                          const std::vector<Series>& speeds) {
   std::optional<MotorLagFit> best;
   double least = 0.0;
-  for (double lag_s = kShortest_s; lag_s < kLongest_s; lag_s *= kLagStep) {
+  double lag_s = kShortest_s;
+  for (int k = 0; k < kLags; ++k, lag_s *= kLagStep) {
     std::vector<std::vector<double>> x;
+    x.reserve(commands.size());
     for (const Series& command : commands) x.push_back(lagged(command, lag_s));
     for (int d = 0; d < kDelays; ++d) {
       const double delay_s = d * kDelayStep_s;

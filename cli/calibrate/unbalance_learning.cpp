@@ -204,6 +204,7 @@ std::array<double, kMaxRotors> speed_errors(const std::vector<FlightRecord>& fli
   std::array<double, kMaxRotors> errors{};
   for (std::size_t i = 0; i < rotors; ++i) {
     std::vector<double> found;
+    found.reserve(flights.size());
     for (const FlightRecord& flight : flights) found.push_back(flight.speed_error_ratio[i]);
     errors[i] = median(found);
   }
