@@ -190,6 +190,22 @@ Phase FlightPhase::by_report() const noexcept {
   return Phase::kUnknown;
 }
 
+bool FlightPhase::has_left_the_ground(double dt_s) noexcept {
+  const double g = kGravity_m_s2;
+  const double thrust = thrust_m_s2();
+  // Speed gained since the thrust rose; standing, it starts over.
+  const double g0 = standing_up_m_s2_.has_value ? standing_up_m_s2_.value : g;
+  if (phase_ == Phase::kOnGround || phase_ == Phase::kContact || thrust < kThrustOn * g)
+    speed_gained_m_s_ = 0.0;
+  // In a landing the ground's push must not count: what the rotors alone would give does.
+  const double lift = phase_ == Phase::kLanding ? thrust : up_.value;
+  speed_gained_m_s_ = std::max(0.0, speed_gained_m_s_ + (lift - g0) * dt_s);
+  const bool lifts = speed_gained_m_s_ > kSpeedGained_m_s &&
+                     std::abs(unexplained_up_.value / g) < kExplained && thrust > 0.5 * g;
+  const bool climbs = climb_m_s_ > kClimb_m_s && thrust > 0.5 * g;
+  return airborne_.for_s(lifts || climbs, dt_s, kAirborne_s);
+}
+
 Phase FlightPhase::next(double dt_s) noexcept {
   if (!has_thrust_) return by_report();
   const double g = kGravity_m_s2;
@@ -206,16 +222,7 @@ Phase FlightPhase::next(double dt_s) noexcept {
   const bool rests =
       still_.for_s(is_still && unexplained > kCarried && thrust < kThrustOff * g, dt_s, kStill_s);
 
-  // Speed gained since the thrust rose; standing, it starts over.
-  const double g0 = standing_up_m_s2_.has_value ? standing_up_m_s2_.value : g;
-  if (phase_ == Phase::kOnGround || phase_ == Phase::kContact || thrust < kThrustOn * g)
-    speed_gained_m_s_ = 0.0;
-  // In a landing the ground's push must not count: what the rotors alone would give does.
-  const double lift = phase_ == Phase::kLanding ? thrust : up_.value;
-  speed_gained_m_s_ = std::max(0.0, speed_gained_m_s_ + (lift - g0) * dt_s);
-  const bool lifts = speed_gained_m_s_ > kSpeedGained_m_s && std::abs(up) < kExplained && thrust > 0.5 * g;
-  const bool climbs = climb_m_s_ > kClimb_m_s && thrust > 0.5 * g;
-  const bool is_airborne = airborne_.for_s(lifts || climbs, dt_s, kAirborne_s);
+  const bool is_airborne = has_left_the_ground(dt_s);
 
   if (unexplained > kContact + rates2 * kLeverArm_m / g) {
     free_.reset();

@@ -109,6 +109,8 @@ class FlightPhase {
   void choose_source(TimePoint now) noexcept;
   void observe(double dt_s, const std::array<double, 3>& accel, const std::array<double, 3>& gyro) noexcept;
   void learn(double dt_s) noexcept;
+  /// By (4), or by the reported climb.
+  [[nodiscard]] bool has_left_the_ground(double dt_s) noexcept;
   [[nodiscard]] Phase next(double dt_s) noexcept;
   [[nodiscard]] Phase by_report() const noexcept;
   void compare() noexcept;

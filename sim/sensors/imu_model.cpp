@@ -31,7 +31,7 @@ ImuModel::Filter ImuModel::butterworth(double cutoff_Hz, double rate_Hz) {
 }
 
 Eigen::Vector3d ImuModel::Filter::step(const Eigen::Vector3d& x) {
-  const Eigen::Vector3d y = b0 * x + s1;
+  Eigen::Vector3d y = b0 * x + s1;
   s1 = b1 * x - a1 * y + s2;
   s2 = b2 * x - a2 * y;
   return y;
