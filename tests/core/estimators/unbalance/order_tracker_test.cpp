@@ -178,6 +178,21 @@ void expect_symmetric_and_positive(const OrderTracker<double, N>& tracker) {
   ASSERT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P).eigenvalues().minCoeff(), 0.0);
 }
 
+template <std::size_t N>
+void expect_equal(const OrderTracker<double, N>& tracker, const test::DenseOrderFilter& reference) {
+  for (std::size_t i = 0; i < N; ++i) {
+    const auto r = static_cast<Eigen::Index>(i);
+    EXPECT_NEAR(std::abs(complex(tracker.x_m_s2(i)) - reference.amplitude(r, 0)), 0.0, 1e-9) << i;
+    EXPECT_NEAR(std::abs(complex(tracker.y_m_s2(i)) - reference.amplitude(r, 1)), 0.0, 1e-9) << i;
+    for (std::size_t j = 0; j < N; ++j) {
+      const auto c = static_cast<Eigen::Index>(j);
+      EXPECT_NEAR(tracker.covariance_m2_s4(2 * i, 2 * j + 1), reference.P(4 * r, 4 * c + 1), 1e-9);
+      EXPECT_NEAR(tracker.covariance_m2_s4(2 * i, 2 * j + 1), reference.P(4 * r + 2, 4 * c + 3), 1e-9);
+    }
+  }
+  EXPECT_NEAR(tracker.noise_variance_m2_s4(), reference.noise_variance(), 1e-9);
+}
+
 /// The same samples to tracker and dense reference; the reference is given the speeds the test itself interpolates.
 template <std::size_t N>
 void expect_the_dense_filter(World world, double dt_s, double low_pass_Hz) {
@@ -218,17 +233,7 @@ void expect_the_dense_filter(World world, double dt_s, double low_pass_Hz) {
     }
     reference.step(dt_s, a, world.window_s, speed, Eigen::VectorXd::Constant(N, report_s));
   }
-  for (std::size_t i = 0; i < N; ++i) {
-    const auto r = static_cast<Eigen::Index>(i);
-    EXPECT_NEAR(std::abs(complex(tracker.x_m_s2(i)) - reference.amplitude(r, 0)), 0.0, 1e-9) << i;
-    EXPECT_NEAR(std::abs(complex(tracker.y_m_s2(i)) - reference.amplitude(r, 1)), 0.0, 1e-9) << i;
-    for (std::size_t j = 0; j < N; ++j) {
-      const auto c = static_cast<Eigen::Index>(j);
-      EXPECT_NEAR(tracker.covariance_m2_s4(2 * i, 2 * j + 1), reference.P(4 * r, 4 * c + 1), 1e-9);
-      EXPECT_NEAR(tracker.covariance_m2_s4(2 * i, 2 * j + 1), reference.P(4 * r + 2, 4 * c + 3), 1e-9);
-    }
-  }
-  EXPECT_NEAR(tracker.noise_variance_m2_s4(), reference.noise_variance(), 1e-9);
+  expect_equal(tracker, reference);
 }
 
 TEST(OrderTracker, EqualsADenseTextbookKalmanFilter) {
@@ -558,6 +563,14 @@ TEST(OrderTracker, EqualSpeedsLeaveTheDifferenceUnknown) {
   EXPECT_NEAR(std::abs(sum), std::abs(world.x[0] + world.x[1]), 0.05);
 }
 
+int pairs_apart(const OrderTracker<double, 4>& tracker) {
+  int count = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = 0; j < i; ++j) count += tracker.are_apart(i, j) ? 1 : 0;
+  }
+  return count;
+}
+
 // Which a filter that believes the phases would not notice: equal speeds, reported with noise.
 TEST(OrderTracker, EqualSpeedsWithNoisyTelemetryAreNotApart) {
   World world{4, 1520.0};
@@ -576,9 +589,7 @@ TEST(OrderTracker, EqualSpeedsWithNoisyTelemetryAreNotApart) {
       tracker.on_speeds(at(t), speeds);
     }
     (void)tracker.on_accel(at(t), std::cos(1520.0 * t), std::sin(1520.0 * t), 0.0);
-    for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t j = 0; j < i; ++j) apart += tracker.are_apart(i, j) ? 1 : 0;
-    }
+    apart += pairs_apart(tracker);
   }
   EXPECT_EQ(apart, 0);
 }
@@ -590,6 +601,22 @@ TEST(OrderTracker, UsesNoHeap) {
   const test::AllocationGuard guard;
   flight.fly(0.5);
   EXPECT_EQ(guard.allocations(), 0U);
+}
+
+void expect_twins(OrderTracker<double, 4>& tracker, OrderTracker<double, 4>& twin, const World& world,
+                  double t) {
+  for (int k = 0; k < 200; ++k) {
+    const double now = t + 0.002 * k;
+    std::array<double, 4> speeds;
+    for (std::size_t i = 0; i < 4; ++i) speeds[i] = world.speed(i, now);
+    tracker.on_speeds(at(now), speeds);
+    twin.on_speeds(at(now), speeds);
+    const Eigen::Vector2d a = world.accel(now);
+    (void)tracker.on_accel(at(now), a.x(), a.y(), 0.0);
+    (void)twin.on_accel(at(now), a.x(), a.y(), 0.0);
+    ASSERT_EQ(tracker.innovation().x_m_s2, twin.innovation().x_m_s2);
+    ASSERT_EQ(tracker.x_m_s2(2).re, twin.x_m_s2(2).re);
+  }
 }
 
 TEST(OrderTracker, RefusedSamplesChangeNothing) {
@@ -611,18 +638,7 @@ TEST(OrderTracker, RefusedSamplesChangeNothing) {
   EXPECT_EQ(tracker.counters().time_backward, 2);
   EXPECT_EQ(tracker.counters().speed_refused, 4);
   OrderTracker<double, 4> twin = before;
-  for (int k = 0; k < 200; ++k) {
-    const double now = t + 0.002 * k;
-    std::array<double, 4> speeds;
-    for (std::size_t i = 0; i < 4; ++i) speeds[i] = world.speed(i, now);
-    tracker.on_speeds(at(now), speeds);
-    twin.on_speeds(at(now), speeds);
-    const Eigen::Vector2d a = world.accel(now);
-    (void)tracker.on_accel(at(now), a.x(), a.y(), 0.0);
-    (void)twin.on_accel(at(now), a.x(), a.y(), 0.0);
-    ASSERT_EQ(tracker.innovation().x_m_s2, twin.innovation().x_m_s2);
-    ASSERT_EQ(tracker.x_m_s2(2).re, twin.x_m_s2(2).re);
-  }
+  expect_twins(tracker, twin, world, t);
 }
 
 TEST(OrderTracker, AGapInTheSamplesForgetsWhatHasNoPhaseAnyMore) {
