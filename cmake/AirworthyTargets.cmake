@@ -8,12 +8,14 @@ target_compile_options(airworthy_compile_options INTERFACE
   -ffp-contract=off)
 if(AIRWORTHY_SANITIZE)
   target_compile_options(airworthy_compile_options INTERFACE
-    -fsanitize=${AIRWORTHY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    -fsanitize=${AIRWORTHY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
+    # Core has no run-time type information, which the check of virtual calls needs.
+    -fno-sanitize=vptr)
   target_link_options(airworthy_compile_options INTERFACE -fsanitize=${AIRWORTHY_SANITIZE})
 endif()
 if(AIRWORTHY_FUZZ)
   target_compile_options(airworthy_compile_options INTERFACE
-    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -fno-sanitize=vptr)
   target_link_options(airworthy_compile_options INTERFACE -fsanitize=address,undefined)
 endif()
 
