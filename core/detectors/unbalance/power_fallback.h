@@ -21,7 +21,7 @@ namespace airworthy {
 template <std::size_t N>
 class PowerFallback {
  public:
-  static constexpr double kLead = 20.0;
+  static constexpr double kLead = 40.0;
   static constexpr double kHold_s = 2.0;
   static constexpr double kLeast_s = 15.0;
   static constexpr double kCommandsFresh_s = 0.5;

@@ -361,7 +361,8 @@ void RotorUnbalanceMonitor<N>::judge_by_power(TimePoint now, double dt_s) noexce
     rotor.growth_m_s2 =
         rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[i] : params_.usual_m_s2);
     rotor.log_odds = verdict.evidence[i];
-    const bool is_grown = verdict.named == i && rotor.growth_m_s2 > params_.smallest_m_s2;
+    const bool is_grown =
+        verdict.named == i && rotor.growth_m_s2 - kSigmas * rotor.sigma_m_s2 > params_.smallest_m_s2;
     grown_[i].step(is_grown, now);
     rotor.test_ratio = is_grown || is_known_[i] ? 1.0 : 0.0;
     if (is_grown && !is_known_[i]) rotor.onset = now;
