@@ -281,7 +281,7 @@ def crazypad_lines(folder, monitored):
         f"Of 1 mm or less, and tape: {sum(verdict[0] is not None for _, verdict in small)} of {len(small)}.",
         "- Vibration alone finds nothing at this rate of false alarms: the normal flights of E8 fall into two groups whose vibration",
         "  differs threefold (0.006 to 0.010 and 0.017 g) and whose M3 command differs by 8 %, more than any small damage makes. With",
-        "  5 and 7 normal flights of evidently different sessions that is the baseline there is. Judged within one session more",
+        "  5 and 7 normal flights of evidently different occasions that is the baseline there is. Judged within one occasion more",
         "  would be seen, but the recordings do not tell which flights share one.",
         "- The series of E9 with M1 and M2 cut was flown with an M3 that needs more command than in the normal flights; where the cuts",
         "  are small, M3 is blamed. It cannot be told from thrust loss of M3.",
