@@ -66,8 +66,8 @@ class MultirotorReplay(SystemTest):
         raised = {(component, kind) for _, phase, component, kind, *_ in first if phase == 1}
         print(f"{len(first)} events: {sorted(raised)}")
         self.assertLessEqual({("rotor 2", "unbalance"), ("rotor 3", "propeller_lost")}, raised)
-        # Detectors are processes of their own: their events mix on the bus as it comes.
-        self.assertEqual(sorted(first, key=repr), sorted(second, key=repr))
+        # Detectors are processes of their own: their events mix on the bus as it comes. As text, for NaN equals nothing.
+        self.assertEqual(sorted(map(repr, first)), sorted(map(repr, second)))
 
 
 if __name__ == "__main__":
