@@ -19,7 +19,7 @@ constexpr double kOnset_s = 14.0;
 constexpr double kDamage_mg = 80.0;
 
 UnbalanceConfig hexa_config() {
-  auto config = UnbalanceConfig::load(AIRWORTHY_CONFIG "/unbalance.toml", {});
+  auto config = UnbalanceConfig::load(AIRWORTHY_CONFIG "/unbalance.toml", {"threshold.usual=40"});
   EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
   config->monitor.low_pass_Hz = 180.0;
   return *config;
