@@ -10,26 +10,12 @@
 #include "airworthy/imu_t.hpp"
 #include "airworthy/rotor_command_t.hpp"
 #include "runtime/bus/channels.h"
+#include "runtime/phase/landed_report.h"
 
 namespace airworthy::rt {
 namespace {
 
 constexpr double kRadSPerRpm = std::numbers::pi / 30.0;
-
-LandedReport to_report(std::int8_t landed_state) {
-  switch (landed_state) {
-    case 1:
-      return LandedReport::kOnGround;
-    case 2:
-      return LandedReport::kInAir;
-    case 3:
-      return LandedReport::kTakingOff;
-    case 4:
-      return LandedReport::kLanding;
-    default:
-      return LandedReport::kUnknown;
-  }
-}
 
 }  // namespace
 
@@ -50,9 +36,8 @@ FlightPhaseInput::FlightPhaseInput(Node& node, const Multirotor& vehicle) : node
   node.subscribe<flight_state_t>(channel::kFlightState, [this](const flight_state_t& message) {
     const TimePoint time = from_us(message.header.time_us);
     queue(time, 2,
-          [time, landed = to_report(message.landed_state), climb = message.climb_m_s](FlightPhase& phase) {
-            phase.on_report(time, landed, climb);
-          });
+          [time, landed = landed_report(message.landed_state),
+           climb = message.climb_m_s](FlightPhase& phase) { phase.on_report(time, landed, climb); });
   });
   node.subscribe<imu_t>(channel::kImu, [this](const imu_t& message) {
     if (sensor_id_ < 0) sensor_id_ = message.sensor_id;

@@ -6,6 +6,7 @@
 
 #include "airworthy/tick_t.hpp"
 #include "runtime/bus/channels.h"
+#include "runtime/phase/landed_report.h"
 
 namespace airworthy::effectiveness {
 namespace {
@@ -25,21 +26,6 @@ LossOfEffectivenessParams<double> filter_params(const EffectivenessParams& monit
   params.measurement_variance[kYawRow] = kYawVariance;
   params.lost_below = monitor.lost_below_ratio;
   return params;
-}
-
-LandedReport to_report(std::int8_t landed_state) {
-  switch (landed_state) {
-    case 1:
-      return LandedReport::kOnGround;
-    case 2:
-      return LandedReport::kInAir;
-    case 3:
-      return LandedReport::kTakingOff;
-    case 4:
-      return LandedReport::kLanding;
-    default:
-      return LandedReport::kUnknown;
-  }
 }
 
 std::vector<evidence_t> evidence_of(const LossEvent& event, const EffectivenessMonitor& monitor) {
@@ -66,7 +52,7 @@ EffectivenessService::EffectivenessService(rt::Node& node, const EffectivenessCo
   node_.subscribe<rotor_command_t>(channel::kRotorCommand,
                                    [this](const rotor_command_t& message) { on_rotor_command(message); });
   node_.subscribe<flight_state_t>(channel::kFlightState, [this](const flight_state_t& message) {
-    monitor_.on_report(to_report(message.landed_state));
+    monitor_.on_report(rt::landed_report(message.landed_state));
   });
   node_.subscribe<tick_t>(channel::kTick,
                           [this](const tick_t& message) { tick_ = from_us(message.header.time_us); });
