@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "runtime/config/named_calibration.h"
 #include "runtime/config/vehicle.h"
 #include "services/effectiveness/calibration.h"
 
@@ -58,16 +59,8 @@ void read_policy(ConfigTable table, EffectivenessParams& params) {
 
 void read_calibration(ConfigTable root, bool opens_it, EffectivenessConfig& config) {
   if (!root.has("calibration")) return;
-  const auto path = root.required_path("calibration");
-  if (path.empty() || !opens_it) return;
-  const auto calibration = load_calibration(path);
-  if (!calibration) return root.fail_in_other_file(calibration.error());
-  root.record("calibration.hash", calibration->hash);
-  if (calibration->vehicle != config.vehicle) {
-    return root.fail("calibration",
-                     fmt::format("is of vehicle \"{}\", not of \"{}\"", calibration->vehicle, config.vehicle),
-                     {"vehicle"});
-  }
+  const auto calibration = rt::named_calibration(root, config.vehicle, opens_it, load_calibration);
+  if (!calibration) return;
   config.monitor = with_calibration(config.monitor, *calibration);
   config.is_calibrated = true;
 }

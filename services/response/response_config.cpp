@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/config/named_calibration.h"
 #include "runtime/config/vehicle.h"
 #include "services/response/calibration.h"
 
@@ -206,16 +207,8 @@ ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
 }
 
 void read_calibration(ConfigTable root, bool cold, ResponseConfig& config) {
-  const auto path = root.required_path("calibration");
-  if (path.empty() || cold) return;
-  const auto calibration = load_calibration(path);
-  if (!calibration) return root.fail_in_other_file(calibration.error());
-  root.record("calibration.hash", calibration->hash);
-  if (calibration->vehicle != config.vehicle) {
-    return root.fail("calibration",
-                     fmt::format("is of vehicle \"{}\", not of \"{}\"", calibration->vehicle, config.vehicle),
-                     {"vehicle"});
-  }
+  const auto calibration = rt::named_calibration(root, config.vehicle, !cold, load_calibration);
+  if (!calibration) return;
   auto monitor = with_calibration(config.monitor, config.channel_names(), *calibration);
   if (!monitor) return root.fail("calibration", monitor.error().text, {"channel"});
   config.monitor = *monitor;

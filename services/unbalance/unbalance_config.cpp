@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "runtime/config/named_calibration.h"
 #include "runtime/config/vehicle.h"
 #include "services/unbalance/calibration.h"
 
@@ -60,16 +61,8 @@ void read_policy(ConfigTable table, UnbalanceParams& params) {
 
 void read_calibration(ConfigTable root, bool opens_it, UnbalanceConfig& config) {
   if (!root.has("calibration")) return;
-  const auto path = root.required_path("calibration");
-  if (path.empty() || !opens_it) return;
-  const auto calibration = load_calibration(path);
-  if (!calibration) return root.fail_in_other_file(calibration.error());
-  root.record("calibration.hash", calibration->hash);
-  if (calibration->vehicle != config.vehicle) {
-    return root.fail("calibration",
-                     fmt::format("is of vehicle \"{}\", not of \"{}\"", calibration->vehicle, config.vehicle),
-                     {"vehicle"});
-  }
+  const auto calibration = rt::named_calibration(root, config.vehicle, opens_it, load_calibration);
+  if (!calibration) return;
   auto params = with_calibration(config.monitor, *calibration);
   if (!params) return root.fail("calibration", params.error().text, {"vehicle"});
   config.monitor = *params;
