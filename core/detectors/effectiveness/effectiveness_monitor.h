@@ -30,6 +30,8 @@ struct ModelNoise {
   double lag_error_ratio = 0.1;  ///< of the motors' time constant ...
   double latency_error_s =
       0.001;  ///< ... and of commands: speeds that change are known so much too late or early
+  double unheard_lag_error_ratio = 0.3;       ///< the same of motors whose speeds nobody reports ...
+  double unheard_latency_error_s = 0.003;     ///< ... and of their commands
   double disturbance_ratio_per_sqrt_s = 0.1;  ///< gusts: how fast an outer moment or force wanders
   double vertical_ratio_per_sqrt_s = 0.6;     ///< climbing changes the thrust of all rotors
   double gyro_rad_s = 0.03;                   ///< first guess; adapts
@@ -49,7 +51,7 @@ struct EffectivenessParams {
   bool mapping_is_known = false;       ///< as after a calibration: no need to wait for proof in flight
   Duration most_wait{20'000};          ///< for the inputs that explain a sample
   Duration settle{500'000};            ///< in flight before a great loss is looked for
-  Duration settle_partial{3'000'000};  ///< and before a partial one is
+  Duration settle_partial{3'000'000};  ///< and before a partial one is, or anything once reports have stopped
   Duration most_classifying{
       30'000};  ///< from the onset until what is not surely lost is called a partial loss
 };
@@ -58,9 +60,9 @@ enum class Muted : std::uint8_t {
   kNot,
   kPhase,  ///< on ground, taking off, landing, contact
   kSettling,
-  kStruck,   ///< pushed from the side, as no rotor can
-  kTooSlow,  ///< inertial data come less often than kLeastRate_Hz
-  kNoSpeeds,
+  kStruck,          ///< pushed from the side, as no rotor can
+  kTooSlow,         ///< inertial data come less often than kLeastRate_Hz
+  kNoSpeeds,        ///< neither reports nor commands
   kTelemetry,       ///< of one rotor implausible, frozen or missing
   kMappingUnknown,  ///< nothing has yet shown that the rotors are numbered as described
   kRotorMapping,    ///< the vehicle moves as if the rotors were numbered otherwise
@@ -111,6 +113,21 @@ class EffectivenessMonitor {
   std::optional<LossEvent> on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept;
   std::optional<LossEvent> on_commands(TimePoint time, std::span<const double> command_ratio) noexcept;
 
+  /// What became of an inertial sample.
+  struct Judgement {
+    TimePoint from;  ///< of the sample before
+    TimePoint time;
+    Muted muted;  ///< kNot: it took part in the test, or restarted it after a gap
+    Phase phase;
+    std::size_t muted_rotor;
+  };
+  /// Shows every sample in order of time: for evaluation.
+  using JudgementObserver = void (*)(void* context, const Judgement& judgement);
+  void observe_judgement(JudgementObserver observer, void* context) noexcept {
+    judgement_observer_ = observer;
+    judgement_context_ = context;
+  }
+
   /// Shows every sample that is judged, before the judgement: for evaluation.
   using Observer = void (*)(void* context, const MotionSample<double>& sample, TimePoint now);
   void observe(Observer observer, void* context) noexcept {
@@ -145,7 +162,11 @@ class EffectivenessMonitor {
   std::optional<LossEvent> step(const Inertial& sample, TimePoint now) noexcept;
   [[nodiscard]] Muted reason(const Inertial& sample) noexcept;
   [[nodiscard]] bool is_blow(const MotionSample<double>& motion) const noexcept;
+  std::optional<LossEvent> judge(const Inertial& sample, double dt_s, TimePoint now) noexcept;
+  [[nodiscard]] bool advance_speeds(TimePoint time) noexcept;
+  [[nodiscard]] double longest_step_s() const noexcept;
   void watch_input(const Inertial& sample, double dt_s) noexcept;
+  void watch_source(TimePoint time) noexcept;
   void start(const Inertial& sample) noexcept;
   void watch_mapping(const Inertial& sample, double dt_s) noexcept;
   [[nodiscard]] MotionSample<double> innovate(const Inertial& sample, double dt_s) noexcept;
@@ -163,10 +184,12 @@ class EffectivenessMonitor {
   std::array<double, 3> authority_{};  ///< acceleration that one rotor gives in hover
   std::array<double, kMaxRotors> effectiveness_{};
   std::array<double, kMaxRotors> speed_before_{};
+  std::array<double, kMaxRotors> mean_speed2_{};  ///< since the sample before
   std::array<std::array<double, 2>, kMaxRotors> inflow_per_rate_{};
   std::array<double, kMaxRotors> vertical_at_imu_{};
   double hover_speed_sum_ = 1.0;
   double timing_error_s_ = 0.0;
+  double unheard_timing_error_s_ = 0.0;
   double mean_vertical_m_s2_ = 0.0;  ///< that the rotors give, slow
 
   std::array<Inertial, kWaiting> waiting_{};
@@ -175,6 +198,9 @@ class EffectivenessMonitor {
   std::optional<TimePoint> last_imu_;
   std::optional<TimePoint> last_processed_;
   std::optional<TimePoint> in_flight_since_;
+  SpeedSource source_ = SpeedSource::kNone;
+  bool needs_start_ = false;
+  std::optional<TimePoint> source_since_;  ///< speeds come from commands alone, or no longer do
   std::optional<std::size_t> lost_;
   std::array<LateralForce, 2> lateral_;
   std::optional<TimePoint> struck_;
@@ -185,6 +211,8 @@ class EffectivenessMonitor {
   double mapping_age_s_ = 0.0;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
+  JudgementObserver judgement_observer_ = nullptr;
+  void* judgement_context_ = nullptr;
   bool reported_in_air_ = false;
   bool cautious_ = false;  ///< perhaps touching the ground
   Muted muted_ = Muted::kNoSpeeds;

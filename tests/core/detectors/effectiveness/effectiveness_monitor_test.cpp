@@ -143,7 +143,7 @@ TEST(EffectivenessMonitor, IsMutedWithAReason) {
   EXPECT_FALSE(hover.event);
 
   Hover slow;
-  slow.step_s = 0.01;
+  slow.step_s = 0.025;
   slow.fly(5.0);
   EXPECT_EQ(slow.monitor.muted(), Muted::kTooSlow);
 }
