@@ -41,6 +41,9 @@ inline constexpr double kDescribedSigma = 0.2;
 ///   Motor              first-order lag and delay from commands to reported speeds with the least squared
 ///                      difference over a grid, each rotor with its own scale; the delay beyond (1) is that of the
 ///                      commands                                                                         (3)
+///   Without reports    if no flight has rotor speeds: lag and delay from the same grid for which the commands explain most
+///                      of roll and pitch; the speed that a command gives is that of the vehicle file, and what is
+///                      wrong with it goes into the gains                                                (6)
 ///   Noise              what the detector's own variances settle at with (1) to (3)                          (4)
 ///   Smallest loss      s with s²·b/2 = h, b the information that one second of hover gives about a rotor         (5)
 /// Refuses, naming it, an axis that was not excited: the rotors explain less than a tenth of its changes, or its gain
