@@ -33,6 +33,7 @@ constexpr double kRadPerS_per_rpm = std::numbers::pi / 30.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Duration kBeforeOnset{500'000};
 constexpr Duration kSettle{1'000'000};
+constexpr Duration kInertialDelayStep{2'500};
 constexpr double kLatencyStep_s = 0.002;
 constexpr int kLatencies = 21;
 constexpr int kLags = 26;
@@ -41,8 +42,12 @@ constexpr double kLagRatio = 1.15;
 constexpr int kDelays = 17;
 constexpr double kDelayStep_s = 0.003;
 constexpr double kBlock_s = 5.0;
-constexpr double kLongestStep_s = 0.05;
+constexpr double kMostCommandInterval_s = 0.025;  // the order of the motors' lag
+constexpr double kLongestStep_s = 0.03;           // a longer one is a gap ...
+constexpr double kGapSteps = 3.0;                 // ... or one of so many usual steps ...
+constexpr double kMostStep_s = 0.05;              // ... of seldom samples
 constexpr double kLeastExplained = 0.1;
+constexpr double kAsMuch = 0.9;
 constexpr double kMostRelativeError = 0.15;
 constexpr double kGravity_m_s2 = 9.81;
 
@@ -83,11 +88,32 @@ class Series {
   std::size_t next_ = 0;
 };
 
+double longest_step_s(const Recording& flight) {
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < flight.in_flight.size(); ++k)
+    steps_s.push_back(to_seconds(flight.in_flight[k].time - flight.in_flight[k - 1].time));
+  if (steps_s.empty()) return kLongestStep_s;
+  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+  std::nth_element(steps_s.begin(), middle, steps_s.end());
+  return std::clamp(kGapSteps * *middle, kLongestStep_s, kMostStep_s);
+}
+
+double command_interval_s(const Recording& flight) {
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < flight.commands.size(); ++k)
+    steps_s.push_back(to_seconds(flight.commands[k].time - flight.commands[k - 1].time));
+  if (steps_s.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+  std::nth_element(steps_s.begin(), middle, steps_s.end());
+  return *middle;
+}
+
 double flown_s(const Recording& flight) {
+  const double longest_s = longest_step_s(flight);
   double seconds = 0.0;
   for (std::size_t k = 1; k < flight.in_flight.size(); ++k) {
     const double dt_s = to_seconds(flight.in_flight[k].time - flight.in_flight[k - 1].time);
-    if (dt_s < kLongestStep_s) seconds += dt_s;
+    if (dt_s < longest_s) seconds += dt_s;
   }
   return seconds;
 }
@@ -118,6 +144,7 @@ std::vector<Speeds> commanded_speeds(const std::vector<Recording>& flights, cons
   const double span = params.vehicle.speed_max_rad_s - low;
   std::vector<Speeds> result;
   for (const Recording& flight : flights) {
+    const double longest_s = longest_step_s(flight);
     Speeds speeds(flight.in_flight.size());
     for (std::size_t i = 0; i < params.vehicle.rotor_count; ++i) {
       Series series{flight.commands, i};
@@ -125,7 +152,7 @@ std::vector<Speeds> commanded_speeds(const std::vector<Recording>& flights, cons
         const TimePoint time = flight.in_flight[k].time - from_seconds(delay_s);
         const TimePoint before = k == 0 ? time : flight.in_flight[k - 1].time - from_seconds(delay_s);
         const double dt_s = to_seconds(time - before);
-        if (k == 0 || dt_s > kLongestStep_s) {
+        if (k == 0 || dt_s > longest_s) {
           speeds[k][i] = low + span * series.at(time);
         } else {
           const double wanted = low + span * series.at(before + (time - before) / 2);
@@ -144,6 +171,7 @@ std::vector<Regression> blocks_of(const std::vector<Recording>& flights, const s
   const std::size_t n = params.vehicle.rotor_count;
   std::vector<Regression> blocks;
   for (std::size_t f = 0; f < flights.size(); ++f) {
+    const double longest_s = longest_step_s(flights[f]);
     double block_s = kBlock_s;
     TimePoint before{};
     for (std::size_t k = 0; k < flights[f].in_flight.size(); ++k) {
@@ -153,10 +181,10 @@ std::vector<Regression> blocks_of(const std::vector<Recording>& flights, const s
       if (block_s >= kBlock_s) {
         blocks.emplace_back(n, interval_s);
         block_s = 0.0;
-      } else if (dt_s > kLongestStep_s) {
+      } else if (dt_s > longest_s) {
         blocks.back().interrupt();
       }
-      block_s += std::min(dt_s, kLongestStep_s);
+      block_s += std::min(dt_s, longest_s);
       blocks.back().add(dt_s, std::span{speeds[f][k]}.first(n), sample.gyro_rad_s, sample.accel_m_s2[2]);
     }
   }
@@ -223,23 +251,44 @@ Duration learn_latency(const std::vector<Recording>& flights, const Effectivenes
   return best;
 }
 
-/// Intervals with which the less certain of roll and pitch is most certain: longer ones hide more vibration.
+/// Flights whose streams are stamped on arrival: each is moved by the delay that explains most of it.
+std::vector<Recording> without_inertial_delay(std::vector<Recording> flights,
+                                              const EffectivenessParams& params) {
+  for (Recording& flight : flights) {
+    const Duration delay = inertial_delay_of(flight, params);
+    for (auto& sample : flight.in_flight) sample.time -= delay;
+  }
+  return flights;
+}
+
+/// Intervals with which the less certain of roll and pitch is most certain: longer ones hide more vibration. Of those only
+/// that explain as much as any: over long ones the controller's answer to gusts looks like a weak rotor.
 std::vector<Regression> best_blocks(const std::vector<Recording>& flights, const std::vector<Speeds>& speeds,
                                     const EffectivenessParams& params) {
-  std::vector<Regression> best;
-  double most = -1.0;
-  for (const double times : {1.0, 2.0, 4.0}) {
-    auto blocks = blocks_of(flights, speeds, params, times * shortest_interval_s(params));
+  struct Candidate {
+    std::vector<Regression> blocks;
     double certainty = std::numeric_limits<double>::infinity();
+    double explained = 1.0;
+  };
+  std::vector<Candidate> candidates;
+  double most_explained = 0.0;
+  for (const double times : {1.0, 2.0, 4.0}) {
+    Candidate one;
+    one.blocks = blocks_of(flights, speeds, params, times * shortest_interval_s(params));
     for (const EffectivenessRow row : {kRollRow, kPitchRow}) {
-      const auto axis = learn_axis(blocks, params.effectiveness, row);
-      certainty = std::min(certainty, axis.gain_sigma > 0.0 ? axis.gain / axis.gain_sigma : 0.0);
+      const auto axis = learn_axis(one.blocks, params.effectiveness, row);
+      one.certainty = std::min(one.certainty, axis.gain_sigma > 0.0 ? axis.gain / axis.gain_sigma : 0.0);
+      one.explained = std::min(one.explained, axis.explained);
     }
-    if (certainty <= most) continue;
-    most = certainty;
-    best = std::move(blocks);
+    most_explained = std::max(most_explained, one.explained);
+    candidates.push_back(std::move(one));
   }
-  return best;
+  Candidate* best = nullptr;
+  for (Candidate& one : candidates) {
+    if (one.explained < kAsMuch * most_explained) continue;
+    if (best == nullptr || one.certainty > best->certainty) best = &one;
+  }
+  return std::move(best->blocks);
 }
 
 struct MotorFit {
@@ -375,9 +424,25 @@ double smallest_loss(const EffectivenessParams& params, double threshold) {
 
 }  // namespace
 
-rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& flights,
+Duration inertial_delay_of(const EffectivenessRecording& flight, const EffectivenessParams& params) {
+  Duration best{0};
+  double most = -1.0;
+  if (flight.speeds.empty()) return best;
+  for (Duration delay{0}; delay <= StreamDelay<double>::kMost; delay += kInertialDelayStep) {
+    const double score = score_of({flight}, reported_speeds({flight}, params, -delay), params);
+    if (score <= most) continue;
+    most = score;
+    best = delay;
+  }
+  return best;
+}
+
+rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& recorded,
                                               const EffectivenessConfig& config, bool keeps_unexcited) {
   EffectivenessParams params = config.monitor;
+  const std::vector<Recording> flights =
+      params.learns_inertial_delay ? without_inertial_delay(recorded, params) : recorded;
+  params.learns_inertial_delay = false;
   Calibration calibration;
   calibration.vehicle = config.vehicle;
   calibration.flights = static_cast<int>(flights.size());
@@ -390,6 +455,12 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& flig
     if (lacks_speeds(flight) && flight.commands.empty()) {
       return rt::fail_with(
           fmt::format("{}: neither rotor speeds (ESC_STATUS) nor commands (ROTOR_COMMAND)", flight.log));
+    }
+    if (is_unheard && command_interval_s(flight) > kMostCommandInterval_s) {
+      return rt::fail_with(
+          fmt::format("{}: no rotor speeds (ESC_STATUS), and commands {:.0f} times a second: what the rotors "
+                      "do between is not known; {:.0f} are needed to learn from",
+                      flight.log, 1.0 / command_interval_s(flight), 1.0 / kMostCommandInterval_s));
     }
     if (lacks_speeds(flight) && !is_unheard) {
       return rt::fail_with(

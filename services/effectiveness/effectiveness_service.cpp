@@ -51,12 +51,16 @@ std::string text_of(Muted muted, Phase phase, std::size_t rotor) {
       return fmt::format("not in flight: {}", name_of(phase));
     case Muted::kSettling:
       return "settling after take-off or a change of what the speeds are taken from";
+    case Muted::kNoThrust:
+      return "the rotors hardly lift: what one of them lost would not show";
     case Muted::kStruck:
       return "pushed from the side: not by a rotor";
     case Muted::kTooSlow:
       return "inertial data come less than 50 times a second";
     case Muted::kNoSpeeds:
       return "neither rotor speeds nor commands";
+    case Muted::kDelayUnknown:
+      return "not yet known how much later than the rotor speeds the inertial data come";
     case Muted::kTelemetry:
       return fmt::format("speed of {} missing, frozen or implausible", rotor_name(rotor));
     case Muted::kMappingUnknown:
@@ -210,6 +214,7 @@ rt::DetectorReport EffectivenessService::report() {
                                                                            k, variance),
                       "1"),
          rt::evidence("effectiveness_found", monitor_.effectiveness(i), "1"),
+         rt::evidence("inertial_delay", to_seconds(monitor_.inertial_delay()), "s"),
          rt::evidence("speed_from_commands_alone", uses_commands_alone() ? 1.0 : 0.0, "1")}));
   }
   node_.counters()["samples_refused"] = monitor_.times_gone_back() + monitor_.samples_dropped();

@@ -21,8 +21,13 @@ constexpr double kMostVarianceRatio = 1000.0;
 constexpr double kMeanTime_s = 0.5;
 constexpr double kFirstDisturbance = 0.5;  // standard deviation at first, in shares of one rotor
 constexpr double kTiltInterval_s = 0.05;
+constexpr double kArrivalError = 0.5;  // of a step, standard deviation of stamps of arrival
 constexpr double kMappingPeriod_s = 1.0;
-constexpr double kMappingKeep = 0.98;  // a second: a mapping is learned within a minute
+constexpr Duration kDelayChange{3'000};  // smaller ones are not worth a new start
+constexpr double kMappingKeep = 0.98;    // a second: a mapping is learned within a minute
+constexpr double kLeastLift =
+    0.15;  // of the weight: less, and a lost rotor is within what the model never explains
+constexpr double kHardlyLifts_s = 0.05;
 constexpr double kBlow = 1.5;  // times all that all rotors give: no loss changes so much within a sample
 constexpr double kBlowSigmas = 8.0;
 constexpr double kLateralSlow_s = 0.5;
@@ -66,7 +71,8 @@ EffectivenessMonitor::EffectivenessMonitor(const EffectivenessParams& params) no
     : params_{params},
       speeds_{params.speeds},
       test_{params.vehicle.rotor_count, test_params_of(params), ranges_of(params)},
-      tilt_{params.vehicle.rotor_count, std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)} {
+      tilt_{params.vehicle.rotor_count, std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)},
+      delay_{std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)} {
   effectiveness_.fill(1.0);
   const std::size_t n = params_.vehicle.rotor_count;
   constexpr std::array kRows{kRollRow, kPitchRow, kVerticalRow};
@@ -125,12 +131,21 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
     return std::nullopt;
   }
   last_imu_ = time;
+  // From here on, times are those of the rotor speeds.
+  const TimePoint moved = time - inertial_delay_;
+  if (params_.learns_inertial_delay)
+    learn_delay({time, accel_m_s2, gyro_rad_s, phase}, phase == Phase::kInFlight);
+  if (last_moved_ && moved <= *last_moved_) {  // the delay has just grown
+    ++dropped_;
+    return std::nullopt;
+  }
+  last_moved_ = moved;
   if (waiting_count_ == kWaiting) {
     waiting_first_ = (waiting_first_ + 1) % kWaiting;
     --waiting_count_;
     ++dropped_;
   }
-  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {time, accel_m_s2, gyro_rad_s, phase};
+  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {moved, accel_m_s2, gyro_rad_s, phase};
   ++waiting_count_;
   return process(time);
 }
@@ -166,6 +181,10 @@ std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
 
 void EffectivenessMonitor::watch_input(const Inertial& sample, double dt_s) noexcept {
   mean_step_s_ += 0.01 * (std::min(dt_s, kMostStep_s) - mean_step_s_);
+  double lift_m_s2 = 0.0;
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i)
+    lift_m_s2 -= params_.effectiveness.per_speed2[kVerticalRow][i] * mean_speed2_[i];
+  hardly_lifts_s_ = lift_m_s2 < kLeastLift * kGravity_m_s2 ? hardly_lifts_s_ + dt_s : 0.0;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     if (lateral_[axis].step(sample.accel_m_s2[axis], dt_s)) struck_ = sample.time;
   }
@@ -238,13 +257,56 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
     return Muted::kTelemetry;
   }
   if (!in_flight_since_) in_flight_since_ = sample.time;
+  if (params_.learns_inertial_delay && !delay_is_known_) return Muted::kDelayUnknown;
   if (mapping_ == Mapping::kWrongNumbers) return Muted::kRotorMapping;
   if (sample.time - *in_flight_since_ < params_.settle) return Muted::kSettling;
+  if (hardly_lifts_s_ > kHardlyLifts_s) return Muted::kNoThrust;
   // What was lost together with the reports is taken into the disturbance, and overturns within seconds what cannot
   // fly without it: the reports are missing, not a propeller.
   const Duration settle = source_ == SpeedSource::kCommands ? params_.settle_partial : params_.settle;
   if (source_since_ && sample.time - *source_since_ < settle) return Muted::kSettling;
   return mapping_was_plausible_ || params_.mapping_is_known ? Muted::kNot : Muted::kMappingUnknown;
+}
+
+void EffectivenessMonitor::learn_delay(const Inertial& sample, bool in_flight) noexcept {
+  if (!in_flight || lost_) {
+    delay_.interrupt();
+    delay_added_.reset();
+    delayed_count_ = 0;
+    return;
+  }
+  if (delayed_count_ == kWaiting) {
+    delayed_first_ = (delayed_first_ + 1) % kWaiting;
+    --delayed_count_;
+  }
+  delayed_[(delayed_first_ + delayed_count_) % kWaiting] = sample;
+  ++delayed_count_;
+  while (delayed_count_ > 0 && delayed_[delayed_first_].time <= speeds_.now()) {
+    add_to_delay(delayed_[delayed_first_]);
+    delayed_first_ = (delayed_first_ + 1) % kWaiting;
+    --delayed_count_;
+  }
+  const auto learned = delay_.delay();
+  if (!learned || (delay_is_known_ && std::chrono::abs(*learned - inertial_delay_) < kDelayChange)) return;
+  delay_is_known_ = true;
+  inertial_delay_ = *learned;
+  needs_start_ = true;
+}
+
+void EffectivenessMonitor::add_to_delay(const Inertial& sample) noexcept {
+  const double dt_s = delay_added_ ? to_seconds(sample.time - *delay_added_) : 0.0;
+  delay_added_ = sample.time;
+  if (dt_s > longest_step_s()) delay_.interrupt();
+  StreamDelay<double>::Accelerations u{};
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    const TimePoint then = sample.time - StreamDelay<double>::kStep * static_cast<int>(k);
+    for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+      const double speed = speeds_.speed_at(i, then);
+      u[k][0] += params_.effectiveness.per_speed2[kRollRow][i] * speed * speed;
+      u[k][1] += params_.effectiveness.per_speed2[kPitchRow][i] * speed * speed;
+    }
+  }
+  delay_.add(dt_s, {sample.gyro_rad_s[0], sample.gyro_rad_s[1]}, u);
 }
 
 void EffectivenessMonitor::start(const Inertial& sample) noexcept {
@@ -278,7 +340,11 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   std::array<double, 3> u{};
   std::array<double, 3> timing_variance{};
   std::array<double, 3> gap_variance{};
-  const double timing_error_s = source_ == SpeedSource::kCommands ? unheard_timing_error_s_ : timing_error_s_;
+  // A stamp of arrival says when within a step: what turns so fast was measured elsewhere by so much.
+  const double stamp_error_s = params_.learns_inertial_delay ? kArrivalError * mean_step_s_ : 0.0;
+  const double timing_error_s =
+      (source_ == SpeedSource::kCommands ? unheard_timing_error_s_ : timing_error_s_) + stamp_error_s;
+  double lift_change = 0.0;  // of what the rotors give, each second
   double speed_sum = 0.0;
   for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
     const double speed = speeds_.speed(i);
@@ -300,6 +366,7 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
       timing_variance[axis] += b[axis] * b[axis] * late * late;
       gap_variance[axis] += b[axis] * b[axis] * gap * gap;
     }
+    lift_change += b[2] * (speed * speed - before * before) / dt_s;
   }
   const auto& inertia = params_.vehicle.inertia_kg_m2;
   const auto& w = sample.gyro_rad_s;
@@ -316,7 +383,7 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     motion.rate[axis] = rate_[axis].step(dt_s, u[axis], sample.gyro_rad_s[axis],
                                          {2.0 * (variance * noise.correlation_s + gap_variance[axis] * gap_s),
                                           square(noise.disturbance_ratio_per_sqrt_s * authority_[axis])},
-                                         gyro_variance_[axis].value);
+                                         gyro_variance_[axis].value + square(stamp_error_s * net));
     gyro_variance_[axis].step(motion.rate[axis].innovation, motion.rate[axis].variance, dt_s);
   }
   // The accelerometer beside the centre of mass also feels the body turn faster.
@@ -330,8 +397,9 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   const double density = square(noise.vertical_ratio_per_sqrt_s * authority_[2]) +
                          2.0 * (timing_variance[2] + square(change)) / noise.vertical_correlation_s +
                          2.0 * gap_variance[2] / std::max(gap_s, noise.vertical_correlation_s);
-  motion.vertical = vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(),
-                                   sample.accel_m_s2[2], density, accel_variance_.value);
+  motion.vertical =
+      vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(), sample.accel_m_s2[2],
+                     density, accel_variance_.value + square(stamp_error_s * lift_change));
   accel_variance_.step(motion.vertical.innovation, motion.vertical.variance, dt_s);
   return motion;
 }
@@ -358,7 +426,8 @@ std::optional<LossEvent> EffectivenessMonitor::judge(const Inertial& sample, dou
   watch_input(sample, dt_s);
   muted_ = reason(sample);
   const auto runs = [](Muted muted) {
-    return muted == Muted::kNot || muted == Muted::kSettling || muted == Muted::kMappingUnknown;
+    return muted == Muted::kNot || muted == Muted::kSettling || muted == Muted::kNoThrust ||
+           muted == Muted::kMappingUnknown;
   };
   if (runs(muted_) || muted_ == Muted::kRotorMapping) {
     watch_mapping(sample, dt_s);
@@ -386,7 +455,10 @@ std::optional<LossEvent> EffectivenessMonitor::judge(const Inertial& sample, dou
     test_.reset();
     return std::nullopt;
   }
-  if (muted_ != Muted::kNot) return std::nullopt;
+  if (muted_ != Muted::kNot) {
+    test_.reset();
+    return std::nullopt;
+  }
   judged_s_ += dt_s;
   if (observer_ != nullptr) observer_(observer_context_, motion, now);
   test_.step(motion);

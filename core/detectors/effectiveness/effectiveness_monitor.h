@@ -14,6 +14,7 @@
 #include "core/estimators/effectiveness/effectiveness_matrix.h"
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "core/estimators/effectiveness/rotor_speed_predictor.h"
+#include "core/estimators/effectiveness/stream_delay.h"
 
 namespace airworthy::effectiveness {
 
@@ -49,6 +50,7 @@ struct EffectivenessParams {
   double lost_below_ratio = 0.3;   ///< effectiveness of what counts as lost
   double lost_probability = 0.9;
   bool mapping_is_known = false;       ///< as after a calibration: no need to wait for proof in flight
+  bool learns_inertial_delay = false;  ///< the streams are stamped on arrival: see StreamDelay
   Duration most_wait{20'000};          ///< for the inputs that explain a sample
   Duration settle{500'000};            ///< in flight before a great loss is looked for
   Duration settle_partial{3'000'000};  ///< and before a partial one is, or anything once reports have stopped
@@ -60,9 +62,11 @@ enum class Muted : std::uint8_t {
   kNot,
   kPhase,  ///< on ground, taking off, landing, contact
   kSettling,
+  kNoThrust,        ///< the rotors hardly lift: what one of them lost would not show
   kStruck,          ///< pushed from the side, as no rotor can
   kTooSlow,         ///< inertial data come less often than kLeastRate_Hz
   kNoSpeeds,        ///< neither reports nor commands
+  kDelayUnknown,    ///< not yet known how much later than the speeds the inertial data come
   kTelemetry,       ///< of one rotor implausible, frozen or missing
   kMappingUnknown,  ///< nothing has yet shown that the rotors are numbered as described
   kRotorMapping,    ///< the vehicle moves as if the rotors were numbered otherwise
@@ -145,6 +149,8 @@ class EffectivenessMonitor {
   [[nodiscard]] double effectiveness(std::size_t i) const noexcept { return effectiveness_[i]; }
   [[nodiscard]] std::optional<std::size_t> lost_rotor() const noexcept { return lost_; }
   [[nodiscard]] Mapping mapping() const noexcept { return mapping_; }
+  /// How much later than the rotor speeds the inertial data are stamped, as learned; 0 where it is not.
+  [[nodiscard]] Duration inertial_delay() const noexcept { return inertial_delay_; }
   [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
   [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
@@ -167,6 +173,8 @@ class EffectivenessMonitor {
   [[nodiscard]] double longest_step_s() const noexcept;
   void watch_input(const Inertial& sample, double dt_s) noexcept;
   void watch_source(TimePoint time) noexcept;
+  void learn_delay(const Inertial& sample, bool in_flight) noexcept;
+  void add_to_delay(const Inertial& sample) noexcept;
   void start(const Inertial& sample) noexcept;
   void watch_mapping(const Inertial& sample, double dt_s) noexcept;
   [[nodiscard]] MotionSample<double> innovate(const Inertial& sample, double dt_s) noexcept;
@@ -195,7 +203,8 @@ class EffectivenessMonitor {
   std::array<Inertial, kWaiting> waiting_{};
   std::size_t waiting_first_ = 0;
   std::size_t waiting_count_ = 0;
-  std::optional<TimePoint> last_imu_;
+  std::optional<TimePoint> last_imu_;    ///< as stamped
+  std::optional<TimePoint> last_moved_;  ///< less the delay
   std::optional<TimePoint> last_processed_;
   std::optional<TimePoint> in_flight_since_;
   SpeedSource source_ = SpeedSource::kNone;
@@ -205,7 +214,15 @@ class EffectivenessMonitor {
   std::array<LateralForce, 2> lateral_;
   std::optional<TimePoint> struck_;
   double mean_step_s_ = 0.0;
+  double hardly_lifts_s_ = 0.0;
   ControlRegression<double> tilt_;
+  StreamDelay<double> delay_;
+  std::array<Inertial, kWaiting> delayed_{};  ///< wait for what the speeds were at their stamps
+  std::size_t delayed_first_ = 0;
+  std::size_t delayed_count_ = 0;
+  std::optional<TimePoint> delay_added_;
+  Duration inertial_delay_{0};
+  bool delay_is_known_ = false;
   Mapping mapping_ = Mapping::kUnknown;
   bool mapping_was_plausible_ = false;
   double mapping_age_s_ = 0.0;

@@ -115,6 +115,9 @@ class RotorSpeedPredictor {
   [[nodiscard]] std::span<const Scalar> speeds() const noexcept {
     return std::span{speed_}.first(params_.rotor_count);
   }
+  /// What the speed was at a time not long ago.
+  [[nodiscard]] Scalar speed_at(std::size_t i, TimePoint time) const noexcept { return history_.at(i, time); }
+  [[nodiscard]] TimePoint now() const noexcept { return now_; }
   /// s of (2).
   [[nodiscard]] Scalar scale(std::size_t i) const noexcept { return scale_[i]; }
   /// How far the prediction reaches beyond what is known.
