@@ -283,12 +283,12 @@ std::vector<Regression> best_blocks(const std::vector<Recording>& flights, const
     most_explained = std::max(most_explained, one.explained);
     candidates.push_back(std::move(one));
   }
-  Candidate* best = nullptr;
+  Candidate best;
+  best.certainty = -1.0;
   for (Candidate& one : candidates) {
-    if (one.explained < kAsMuch * most_explained) continue;
-    if (best == nullptr || one.certainty > best->certainty) best = &one;
+    if (one.explained >= kAsMuch * most_explained && one.certainty > best.certainty) best = std::move(one);
   }
-  return std::move(best->blocks);
+  return std::move(best.blocks);
 }
 
 struct MotorFit {
