@@ -35,9 +35,8 @@ constexpr double kLateralFast_s = 0.006;
 constexpr double kLateralVariance_s = 2.0;
 constexpr double kPush_m_s2 = 3.0;
 constexpr double kPushSigmas = 5.0;
-constexpr Duration kStruck{150'000};  // and what follows
-constexpr double kLeastRate_Hz =
-    50.0;  // below, a step is as long as the motors' lag and as a loss takes to overturn
+constexpr Duration kStruck{150'000};    // and what follows
+constexpr double kLeastRate_Hz = 50.0;  // below, usual gaps exceed what the filters of the axes hold for
 constexpr Duration kLeastAge{4'000};    // of the evidence: a blow shows within a sample, a loss builds up
 constexpr double kSurelyPartial = 0.5;  // effectiveness that no lost propeller shows ...
 constexpr Duration kEarliestPartial{15'000};  // ... after so long
