@@ -220,7 +220,7 @@ def effectiveness_recorded(_):
         "filters of the axes hold for steps of up to 50 ms, and the usual gaps of such a stream, two or three samples, are longer.", "",
         "One cause is no physics: from 1.7 to 2.5 s the throws are 3 m high, turning by up to 20 rad/s in pulses of single motors,",
         "and the flight phase takes what it cannot explain of the accelerometer there for the ground (landing, 0.4 to 0.8 s each).",
-        "Later landings and contacts are real.", "",
+        "",
         "What the calibrations learned:", "", "```", *thrown_said, *small_said, "```", "",
         "## A propeller that came off", "",
         f"The Bebop, as its vehicle file describes it: {alarm['component']} {alarm['fault_kind']}, {after_ms:.0f} ms after 12.39 s, "
