@@ -1,9 +1,6 @@
 """Evidence for the detector of lost effectiveness: simulated and recorded flights."""
 import collections
 import hashlib
-import os
-import pathlib
-import re
 
 from evidence_page import ROOT, Failed, build, circumstances, page, run
 
@@ -12,11 +9,9 @@ LOST = ("lost", 0, 1200)
 LOSSES = ("0.1", "0.2", "0.3", "0.4", "0.6")
 PARTIAL_FLIGHTS = 40
 HEALTHY = {"flights": ("healthy", 0, 310, 2, 60), "landings": ("healthy", 5000, 24, 20, 10)}
-THROWS = ("00230 00257 00261 00266 00271 00276 00279 00340", "00232 00259 00264 00267 00273 00277 00281 00342")
-CRAZYFLIES = ("1", "2", "4")
 
 
-def flown(name, arguments):
+def flown(name, arguments, options=()):
     """Lines of the simulated flights; kept beside the hash of the program, so that a broken run goes on."""
     program = PROGRAMS / "effectiveness_evidence"
     folder = ROOT / "build/evidence/effectiveness" / hashlib.sha256(program.read_bytes()).hexdigest()[:16]
@@ -25,7 +20,7 @@ def flown(name, arguments):
     lines = kept.read_text().splitlines() if kept.exists() else []
     if len(lines) < arguments[2]:
         print(f"evidence: effectiveness {name}, {arguments[2]} flights", flush=True)
-        done = run(program, *arguments, capture_output=True)
+        done = run(program, *options, *arguments, capture_output=True)
         if done.returncode != 0:
             raise Failed(done.stderr)
         kept.write_text(done.stdout)
@@ -110,57 +105,8 @@ def healthy_lines():
     return lines + (["", "Every alarm (rotor @ s):", ""] + [f"- {line}" for line in found] if found else [])
 
 
-def evaluate(logs, options):
-    done = run(PROGRAMS / "airworthy-eval", *logs, "--detector", "effectiveness", "--config",
-               ROOT / "config/effectiveness.toml", *options, capture_output=True)
-    return [line for line in done.stdout.splitlines() if re.match(r"\S+ +(none|rotor)", line) and "of" not in line.split()]
-
-
-def recorded(folder):
-    """Healthy motion after calibration on other flights of the set; the ejection as the vehicle file describes it."""
-    data = pathlib.Path(os.environ.get("AIRWORTHY_DATA", ROOT / "../shared/data"))
-    if not data.is_dir():
-        return ["Recorded flights are not at hand here."]
-
-    def imported(source, name):
-        log = folder / f"{source.name.split('.')[0]}.lcm"
-        if run(PROGRAMS / "airworthy-import", "table", source, "--map", ROOT / f"config/import/{name}.toml", "-o", log,
-               capture_output=True).returncode != 0:
-            raise Failed(f"cannot import {source}")
-        return log
-
-    def calibrated(logs, options, name):
-        target = folder / f"{name}.toml"
-        done = run(PROGRAMS / "airworthy-calibrate", "effectiveness", *logs, "--config",
-                   ROOT / "config/effectiveness.toml", *options, "-o", target, capture_output=True)
-        if done.returncode != 0:
-            raise Failed(done.stderr)
-        return target, done.stdout.splitlines()
-
-    lines = ["```"]
-    vehicle = ["--set", f"vehicle={ROOT}/config/vehicles/indiflight_throw.toml"]
-    halves = [[imported(data / f"indiflight_throw/LOG{n}.csv.xz", "indiflight_throw") for n in half.split()]
-              for half in THROWS]
-    for judged, taught, name in ((0, 1, "odd"), (1, 0, "even")):
-        target, said = calibrated(halves[taught], vehicle, name)
-        lines += said + evaluate(halves[judged], [*vehicle, "--set", f"calibration={target}"])
-    vehicle = ["--set", f"vehicle={ROOT}/config/vehicles/crazyflie_brushless.toml", "--set", "input.imu_rate_Hz=100"]
-    runs = {n: imported(data / f"crazyflie_brushless_rpm/square_run{n}.csv.xz", "crazyflie_brushless_rpm")
-            for n in CRAZYFLIES}
-    for n, log in runs.items():
-        target, said = calibrated([other for m, other in runs.items() if m != n], vehicle, f"without_{n}")
-        lines += said[:1] + evaluate([log], [*vehicle, "--set", f"calibration={target}"])
-    vehicle = ["--set", f"vehicle={ROOT}/config/vehicles/bebop2.toml", "--set", "input.telemetry_latency_ms=0",
-               "--set", "input.rotor_mapping_checked=true"]
-    lines += evaluate([imported(data / "bebop2_prop_eject/flight01_11-43-10.csv.xz", "bebop2_prop_eject")], vehicle)
-    return lines + ["```"]
-
-
 def effectiveness(_):
-    for target in ("effectiveness_evidence", "airworthy-import", "airworthy-calibrate", "airworthy-eval"):
-        build("dev", target)
-    folder = ROOT / "build/evidence/effectiveness"
-    folder.mkdir(parents=True, exist_ok=True)
+    build("dev", "effectiveness_evidence")
     lost = flown("lost", LOST)
     page("evidence_effectiveness.md", [
         "# Lost propellers and partial losses", "",
@@ -177,9 +123,4 @@ def effectiveness(_):
         "Clairvoyant: a cumulative sum that knows rotor and size, on the same innovations, its threshold for the same rate of",
         "false alarms; on the flights that ours found.", "", *partial_lines(), "",
         "## Healthy flights", "", *healthy_lines(), "",
-        "## Recorded flights", "",
-        "Healthy throws, judged after a calibration on the other half of the set: free fall, 24 rad/s, impacts. The rules for",
-        "collisions were made on seeing alarms in two of them (LOG00230, LOG00340). The Crazyflie's",
-        "inertial data come 100 times a second over a radio link: below the 150 Hz that the detector asks for it is UNKNOWN,",
-        "which `silent` hides here. The Bebop throws off propeller 2 at 12.39 to 12.45 s. The simulated RflyMAD runs carry no",
-        "rotor speeds, without which the detector does not judge: they are not listed.", "", *recorded(folder)])
+        "Recorded flights: [evidence_effectiveness_recorded.md](evidence_effectiveness_recorded.md)."])

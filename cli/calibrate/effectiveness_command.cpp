@@ -25,8 +25,12 @@ struct Options {
 };
 
 void print_summary(const effectiveness::Calibration& calibration) {
-  fmt::print("{} flights, {:.0f} s of free flight; telemetry {:.0f} ms late", calibration.flights,
-             calibration.used_s, 1e3 * calibration.telemetry_latency_s);
+  fmt::print("{} flights, {:.0f} s of free flight; ", calibration.flights, calibration.used_s);
+  if (calibration.speeds_are_commanded) {
+    fmt::print("no reported speeds: by commands");
+  } else {
+    fmt::print("telemetry {:.0f} ms late", 1e3 * calibration.telemetry_latency_s);
+  }
   if (calibration.motor_time_constant_s > 0.0) {
     fmt::print("; motors: lag {:.1f} ms after {:.0f} ms", 1e3 * calibration.motor_time_constant_s,
                1e3 * calibration.command_latency_s);

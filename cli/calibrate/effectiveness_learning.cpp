@@ -33,6 +33,7 @@ constexpr double kRadPerS_per_rpm = std::numbers::pi / 30.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Duration kBeforeOnset{500'000};
 constexpr Duration kSettle{1'000'000};
+constexpr Duration kInertialDelayStep{2'500};
 constexpr double kLatencyStep_s = 0.002;
 constexpr int kLatencies = 21;
 constexpr int kLags = 26;
@@ -41,8 +42,12 @@ constexpr double kLagRatio = 1.15;
 constexpr int kDelays = 17;
 constexpr double kDelayStep_s = 0.003;
 constexpr double kBlock_s = 5.0;
-constexpr double kLongestStep_s = 0.03;
+constexpr double kMostCommandInterval_s = 0.025;  // the order of the motors' lag
+constexpr double kLongestStep_s = 0.03;           // a longer one is a gap ...
+constexpr double kGapSteps = 3.0;                 // ... or one of so many usual steps ...
+constexpr double kMostStep_s = 0.05;              // ... of seldom samples
 constexpr double kLeastExplained = 0.1;
+constexpr double kAsMuch = 0.9;
 constexpr double kMostRelativeError = 0.15;
 constexpr double kGravity_m_s2 = 9.81;
 
@@ -83,29 +88,104 @@ class Series {
   std::size_t next_ = 0;
 };
 
-/// Sums of every block of 5 s, with speeds that were reported `latency` late.
-std::vector<Regression> blocks_of(const std::vector<Recording>& flights, const EffectivenessParams& params,
-                                  Duration latency, double interval_s) {
+double longest_step_s(const Recording& flight) {
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < flight.in_flight.size(); ++k)
+    steps_s.push_back(to_seconds(flight.in_flight[k].time - flight.in_flight[k - 1].time));
+  if (steps_s.empty()) return kLongestStep_s;
+  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+  std::nth_element(steps_s.begin(), middle, steps_s.end());
+  return std::clamp(kGapSteps * *middle, kLongestStep_s, kMostStep_s);
+}
+
+double command_interval_s(const Recording& flight) {
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < flight.commands.size(); ++k)
+    steps_s.push_back(to_seconds(flight.commands[k].time - flight.commands[k - 1].time));
+  if (steps_s.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+  std::nth_element(steps_s.begin(), middle, steps_s.end());
+  return *middle;
+}
+
+double flown_s(const Recording& flight) {
+  const double longest_s = longest_step_s(flight);
+  double seconds = 0.0;
+  for (std::size_t k = 1; k < flight.in_flight.size(); ++k) {
+    const double dt_s = to_seconds(flight.in_flight[k].time - flight.in_flight[k - 1].time);
+    if (dt_s < longest_s) seconds += dt_s;
+  }
+  return seconds;
+}
+
+/// Rotor speeds, rad/s, at every inertial sample of one flight.
+using Speeds = std::vector<std::array<double, kMaxRotors>>;
+
+/// As reported, `latency` late.
+std::vector<Speeds> reported_speeds(const std::vector<Recording>& flights, const EffectivenessParams& params,
+                                    Duration latency) {
+  std::vector<Speeds> result;
+  for (const Recording& flight : flights) {
+    Speeds speeds(flight.in_flight.size());
+    for (std::size_t i = 0; i < params.vehicle.rotor_count; ++i) {
+      Series series{flight.speeds, i};
+      for (std::size_t k = 0; k < speeds.size(); ++k)
+        speeds[k][i] = series.at(flight.in_flight[k].time + latency);
+    }
+    result.push_back(std::move(speeds));
+  }
+  return result;
+}
+
+/// As commanded, through lag and delay.
+std::vector<Speeds> commanded_speeds(const std::vector<Recording>& flights, const EffectivenessParams& params,
+                                     double lag_s, double delay_s) {
+  const double low = params.vehicle.speed_min_rad_s;
+  const double span = params.vehicle.speed_max_rad_s - low;
+  std::vector<Speeds> result;
+  for (const Recording& flight : flights) {
+    const double longest_s = longest_step_s(flight);
+    Speeds speeds(flight.in_flight.size());
+    for (std::size_t i = 0; i < params.vehicle.rotor_count; ++i) {
+      Series series{flight.commands, i};
+      for (std::size_t k = 0; k < speeds.size(); ++k) {
+        const TimePoint time = flight.in_flight[k].time - from_seconds(delay_s);
+        const TimePoint before = k == 0 ? time : flight.in_flight[k - 1].time - from_seconds(delay_s);
+        const double dt_s = to_seconds(time - before);
+        if (k == 0 || dt_s > longest_s) {
+          speeds[k][i] = low + span * series.at(time);
+        } else {
+          const double wanted = low + span * series.at(before + (time - before) / 2);
+          speeds[k][i] = speeds[k - 1][i] + dt_s / (lag_s + dt_s / 2.0) * (wanted - speeds[k - 1][i]);
+        }
+      }
+    }
+    result.push_back(std::move(speeds));
+  }
+  return result;
+}
+
+/// Sums of every block of 5 s.
+std::vector<Regression> blocks_of(const std::vector<Recording>& flights, const std::vector<Speeds>& speeds,
+                                  const EffectivenessParams& params, double interval_s) {
   const std::size_t n = params.vehicle.rotor_count;
   std::vector<Regression> blocks;
-  for (const Recording& flight : flights) {
-    std::vector<Series> speeds;
-    for (std::size_t i = 0; i < n; ++i) speeds.emplace_back(flight.speeds, i);
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    const double longest_s = longest_step_s(flights[f]);
     double block_s = kBlock_s;
     TimePoint before{};
-    for (const auto& sample : flight.in_flight) {
+    for (std::size_t k = 0; k < flights[f].in_flight.size(); ++k) {
+      const auto& sample = flights[f].in_flight[k];
       const double dt_s = to_seconds(sample.time - before);
       before = sample.time;
       if (block_s >= kBlock_s) {
         blocks.emplace_back(n, interval_s);
         block_s = 0.0;
-      } else if (dt_s > kLongestStep_s) {
+      } else if (dt_s > longest_s) {
         blocks.back().interrupt();
       }
-      block_s += std::min(dt_s, kLongestStep_s);
-      std::array<double, kMaxRotors> now{};
-      for (std::size_t i = 0; i < n; ++i) now[i] = speeds[i].at(sample.time + latency);
-      blocks.back().add(dt_s, std::span{now}.first(n), sample.gyro_rad_s, sample.accel_m_s2[2]);
+      block_s += std::min(dt_s, longest_s);
+      blocks.back().add(dt_s, std::span{speeds[f][k]}.first(n), sample.gyro_rad_s, sample.accel_m_s2[2]);
     }
   }
   return blocks;
@@ -150,9 +230,10 @@ double shortest_interval_s(const EffectivenessParams& params) {
   return std::max(0.05, 2.0 * params.speeds.time_constant_s);
 }
 
-double latency_score(const std::vector<Recording>& flights, const EffectivenessParams& params,
-                     Duration latency) {
-  const auto blocks = blocks_of(flights, params, latency, shortest_interval_s(params));
+/// How much of roll and pitch these speeds explain.
+double score_of(const std::vector<Recording>& flights, const std::vector<Speeds>& speeds,
+                const EffectivenessParams& params) {
+  const auto blocks = blocks_of(flights, speeds, params, shortest_interval_s(params));
   return learn_axis(blocks, params.effectiveness, kRollRow).explained +
          learn_axis(blocks, params.effectiveness, kPitchRow).explained;
 }
@@ -162,7 +243,7 @@ Duration learn_latency(const std::vector<Recording>& flights, const Effectivenes
   double most = -1.0;
   for (int k = 0; k < kLatencies; ++k) {  // (1)
     const Duration latency = from_seconds(k * kLatencyStep_s);
-    const double score = latency_score(flights, params, latency);
+    const double score = score_of(flights, reported_speeds(flights, params, latency), params);
     if (score <= most) continue;
     most = score;
     best = latency;
@@ -170,23 +251,44 @@ Duration learn_latency(const std::vector<Recording>& flights, const Effectivenes
   return best;
 }
 
-/// Intervals with which the less certain of roll and pitch is most certain: longer ones hide more vibration.
-std::vector<Regression> best_blocks(const std::vector<Recording>& flights, const EffectivenessParams& params,
-                                    Duration latency) {
-  std::vector<Regression> best;
-  double most = -1.0;
-  for (const double times : {1.0, 2.0, 4.0}) {
-    auto blocks = blocks_of(flights, params, latency, times * shortest_interval_s(params));
-    double certainty = std::numeric_limits<double>::infinity();
-    for (const EffectivenessRow row : {kRollRow, kPitchRow}) {
-      const auto axis = learn_axis(blocks, params.effectiveness, row);
-      certainty = std::min(certainty, axis.gain_sigma > 0.0 ? axis.gain / axis.gain_sigma : 0.0);
-    }
-    if (certainty <= most) continue;
-    most = certainty;
-    best = std::move(blocks);
+/// Flights whose streams are stamped on arrival: each is moved by the delay that explains most of it.
+std::vector<Recording> without_inertial_delay(std::vector<Recording> flights,
+                                              const EffectivenessParams& params) {
+  for (Recording& flight : flights) {
+    const Duration delay = inertial_delay_of(flight, params);
+    for (auto& sample : flight.in_flight) sample.time -= delay;
   }
-  return best;
+  return flights;
+}
+
+/// Intervals with which the less certain of roll and pitch is most certain: longer ones hide more vibration. Of those only
+/// that explain as much as any: over long ones the controller's answer to gusts looks like a weak rotor.
+std::vector<Regression> best_blocks(const std::vector<Recording>& flights, const std::vector<Speeds>& speeds,
+                                    const EffectivenessParams& params) {
+  struct Candidate {
+    std::vector<Regression> blocks;
+    double certainty = std::numeric_limits<double>::infinity();
+    double explained = 1.0;
+  };
+  std::vector<Candidate> candidates;
+  double most_explained = 0.0;
+  for (const double times : {1.0, 2.0, 4.0}) {
+    Candidate one;
+    one.blocks = blocks_of(flights, speeds, params, times * shortest_interval_s(params));
+    for (const EffectivenessRow row : {kRollRow, kPitchRow}) {
+      const auto axis = learn_axis(one.blocks, params.effectiveness, row);
+      one.certainty = std::min(one.certainty, axis.gain_sigma > 0.0 ? axis.gain / axis.gain_sigma : 0.0);
+      one.explained = std::min(one.explained, axis.explained);
+    }
+    most_explained = std::max(most_explained, one.explained);
+    candidates.push_back(std::move(one));
+  }
+  Candidate best;
+  best.certainty = -1.0;
+  for (Candidate& one : candidates) {
+    if (one.explained >= kAsMuch * most_explained && one.certainty > best.certainty) best = std::move(one);
+  }
+  return std::move(best.blocks);
 }
 
 struct MotorFit {
@@ -235,6 +337,23 @@ MotorFit learn_motor(const std::vector<Recording>& flights, const EffectivenessP
           error += motor_error(flight, params, rotor, lag_s, delay_s);
       }
       if (error > 0.0 && error < best.squared_error) best = {lag_s, delay_s, error};
+    }
+  }
+  return best;
+}
+
+/// Without reports: the lag and the delay for which what was commanded explains most of roll and pitch.
+MotorFit learn_unheard_motor(const std::vector<Recording>& flights, const EffectivenessParams& params) {
+  MotorFit best;
+  double most = -1.0;
+  for (int i = 0; i < kLags; ++i) {  // (6)
+    const double lag_s = kLeastLag_s * std::pow(kLagRatio, i);
+    for (int j = 0; j < kDelays; ++j) {
+      const double delay_s = j * kDelayStep_s;
+      const double score = score_of(flights, commanded_speeds(flights, params, lag_s, delay_s), params);
+      if (score <= most) continue;
+      most = score;
+      best = {lag_s, delay_s, 0.0};
     }
   }
   return best;
@@ -305,26 +424,68 @@ double smallest_loss(const EffectivenessParams& params, double threshold) {
 
 }  // namespace
 
-rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& flights,
+Duration inertial_delay_of(const EffectivenessRecording& flight, const EffectivenessParams& params) {
+  Duration best{0};
+  double most = -1.0;
+  if (flight.speeds.empty()) return best;
+  for (Duration delay{0}; delay <= StreamDelay<double>::kMost; delay += kInertialDelayStep) {
+    const double score = score_of({flight}, reported_speeds({flight}, params, -delay), params);
+    if (score <= most) continue;
+    most = score;
+    best = delay;
+  }
+  return best;
+}
+
+rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& recorded,
                                               const EffectivenessConfig& config, bool keeps_unexcited) {
   EffectivenessParams params = config.monitor;
+  const std::vector<Recording> flights =
+      params.learns_inertial_delay ? without_inertial_delay(recorded, params) : recorded;
+  params.learns_inertial_delay = false;
   Calibration calibration;
   calibration.vehicle = config.vehicle;
   calibration.flights = static_cast<int>(flights.size());
+  const auto lacks_speeds = [](const Recording& flight) { return flight.speeds.empty(); };
+  const bool is_unheard = std::all_of(flights.begin(), flights.end(), lacks_speeds);
   bool has_commands = !flights.empty();
   for (const Recording& flight : flights) {
-    calibration.used_s += static_cast<double>(flight.in_flight.size()) / params.samples_per_s;
+    calibration.used_s += flown_s(flight);
     has_commands = has_commands && !flight.commands.empty();
-    if (flight.speeds.empty())
-      return rt::fail_with(fmt::format("{}: no rotor speeds (ESC_STATUS)", flight.log));
+    if (lacks_speeds(flight) && flight.commands.empty()) {
+      return rt::fail_with(
+          fmt::format("{}: neither rotor speeds (ESC_STATUS) nor commands (ROTOR_COMMAND)", flight.log));
+    }
+    if (is_unheard && command_interval_s(flight) > kMostCommandInterval_s) {
+      return rt::fail_with(
+          fmt::format("{}: no rotor speeds (ESC_STATUS), and commands {:.0f} times a second: what the rotors "
+                      "do between is not known; {:.0f} are needed to learn from",
+                      flight.log, 1.0 / command_interval_s(flight), 1.0 / kMostCommandInterval_s));
+    }
+    if (lacks_speeds(flight) && !is_unheard) {
+      return rt::fail_with(
+          fmt::format("{}: no rotor speeds (ESC_STATUS), but other flights have them; "
+                      "learn from flights of one kind",
+                      flight.log));
+    }
   }
   if (calibration.used_s < kLeastFlight_s) {
     return rt::fail_with(
         fmt::format("only {:.1f} s of free flight, {:g} s are needed", calibration.used_s, kLeastFlight_s));
   }
-  const Duration latency = learn_latency(flights, params);
-  calibration.telemetry_latency_s = to_seconds(latency);
-  const auto blocks = best_blocks(flights, params, latency);
+  std::vector<Speeds> speeds;
+  if (is_unheard) {
+    const MotorFit motor = learn_unheard_motor(flights, params);
+    calibration.speeds_are_commanded = true;
+    calibration.motor_time_constant_s = motor.time_constant_s;
+    calibration.command_latency_s = motor.delay_s;
+    speeds = commanded_speeds(flights, params, motor.time_constant_s, motor.delay_s);
+  } else {
+    const Duration latency = learn_latency(flights, params);
+    calibration.telemetry_latency_s = to_seconds(latency);
+    speeds = reported_speeds(flights, params, latency);
+  }
+  const auto blocks = best_blocks(flights, speeds, params);
   std::string errors;
   int excited = 0;
   for (std::size_t i = 0; i < kRows.size(); ++i) {
@@ -342,7 +503,7 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& flig
     if (keeps_unexcited) axis = {1.0, kDescribedSigma, axis.explained};
   }
   if (!errors.empty() && (!keeps_unexcited || excited == 0)) return rt::fail_with(errors);
-  if (has_commands) {
+  if (has_commands && !is_unheard) {
     const MotorFit motor = learn_motor(flights, params);
     calibration.motor_time_constant_s = motor.time_constant_s;
     calibration.command_latency_s = std::max(0.0, motor.delay_s - calibration.telemetry_latency_s);

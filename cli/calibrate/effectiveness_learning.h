@@ -34,6 +34,11 @@ inline constexpr double kLeastFlight_s = 8.0;
 /// Standard error of a gain that is only described.
 inline constexpr double kDescribedSigma = 0.2;
 
+/// How much later than the rotor speeds the inertial data of a flight are stamped, where a link stamps on arrival: of
+/// 0, 2.5, … 60 ms the delay for which the described rows explain most of roll and pitch.
+[[nodiscard]] Duration inertial_delay_of(const EffectivenessRecording& flight,
+                                         const effectiveness::EffectivenessParams& params);
+
 /// Learns how a vehicle answers to its rotors.
 ///   Telemetry latency  of 0, 2, … 40 ms the one for which the described rows explain most of roll and pitch     (1)
 ///   Gain of an axis    g of ControlRegression with intervals of 1, 2 or 4 times max(50 ms, 2τ), whichever is surest, all flights together; standard
@@ -41,6 +46,9 @@ inline constexpr double kDescribedSigma = 0.2;
 ///   Motor              first-order lag and delay from commands to reported speeds with the least squared
 ///                      difference over a grid, each rotor with its own scale; the delay beyond (1) is that of the
 ///                      commands                                                                         (3)
+///   Without reports    if no flight has rotor speeds: lag and delay from the same grid for which the commands explain most
+///                      of roll and pitch; the speed that a command gives is that of the vehicle file, and what is
+///                      wrong with it goes into the gains; less than 40 commands a second are refused          (6)
 ///   Noise              what the detector's own variances settle at with (1) to (3)                          (4)
 ///   Smallest loss      s with s²·b/2 = h, b the information that one second of hover gives about a rotor         (5)
 /// Refuses, naming it, an axis that was not excited: the rotors explain less than a tenth of its changes, or its gain

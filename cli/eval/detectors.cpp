@@ -9,13 +9,22 @@ namespace {
 
 /// The service refers to its configuration, so both live and die together.
 template <class Config, class Service>
-MakeDetector maker_of(const Config& config) {
+auto maker_of(const Config& config) {
   struct Pair {
     Pair(rt::Node& node, const Config& of) : config{of}, service{node, config} {}
     Config config;
     Service service;
   };
-  return [config](rt::Node& node) { return std::make_shared<Pair>(node, config); };
+  return [config](rt::Node& node, JudgementLog& judgement) {
+    auto pair = std::make_shared<Pair>(node, config);
+    if constexpr (requires { pair->service.observe_judgement({}); }) {
+      pair->service.observe_judgement(
+          [&judgement](TimePoint from, TimePoint until, const std::string& why_muted) {
+            judgement.note(from, until, why_muted);
+          });
+    }
+    return pair;
+  };
 }
 
 template <class Config, class Service>

@@ -11,7 +11,8 @@ namespace airworthy::eval {
 struct ConfiguredDetector {
   std::string process;  ///< "airworthy-unbalance"
   std::string vehicle;  ///< that its configuration names
-  MakeDetector make;
+  /// Puts it on a node of the flight's vehicle; it writes into the log, which must live as long, when it judges.
+  std::function<Detector(rt::Node& node, JudgementLog& judgement)> make;
 };
 
 /// The words for `--detector`, "response" first.

@@ -51,8 +51,8 @@ rt::Expected<Flight> run_flight(const std::string& log_path, const std::string& 
   });
   node.subscribe<fault_event_t>(channel::kFaultEvent, [&flight](const fault_event_t& message) {
     if (message.phase != 1) return;
-    flight.alarms.push_back(
-        {from_us(message.header.time_us), from_us(message.onset_us), message.component, message.fault_kind});
+    flight.alarms.push_back({from_us(message.header.time_us), from_us(message.onset_us), message.component,
+                             message.fault_kind, message.magnitude});
   });
   bool started = false;
   node.subscribe<imu_t>(channel::kImu, [&](const imu_t& message) {

@@ -49,6 +49,7 @@ struct Options {
   std::string flight_name_pattern;
   bool nested = false;
   bool json = false;
+  bool muted = false;
   calibrate::LearningParams learning;
 
   [[nodiscard]] bool is_response() const { return detector == eval::detector_names().front(); }
@@ -63,7 +64,10 @@ rt::Expected<Flights> run_configured(const Options& options) {
   Flights flights(options.logs.size());
   calibrate::for_each_parallel(options.logs.size(), options.learning.jobs, [&](std::size_t i) {
     const std::string& log = options.logs[i];
-    flights[i] = eval::run_flight(log, detector->process, detector->make);
+    eval::JudgementLog judgement;
+    flights[i] = eval::run_flight(log, detector->process,
+                                  [&](rt::Node& node) { return detector->make(node, judgement); });
+    if (flights[i]) flights[i]->judgement = std::move(judgement);
     if (flights[i] && flights[i]->vehicle != detector->vehicle) {
       flights[i] = rt::fail_with(fmt::format("{}: of vehicle \"{}\", but {} is of \"{}\"", log,
                                              flights[i]->vehicle, options.config_path, detector->vehicle));
@@ -117,6 +121,7 @@ int evaluate(const Options& options) {
     evaluation.flights.push_back(std::move(*flight));
   }
   fmt::print("{}", options.json ? eval::to_json(evaluation) : eval::to_table(evaluation));
+  if (options.muted && !options.json) fmt::print("\n{}", eval::to_muted_table(evaluation));
   return failures;
 }
 
@@ -148,6 +153,10 @@ int run(int argc, char** argv) {
                  "--nested: of each channel; default 0.01")
       ->check(CLI::Range(1e-6, 10.0))
       ->needs(nested_flag);
+  app.add_flag(
+      "--muted", options.muted,
+      "also print, for --detector effectiveness, how long each flight was judged and which seconds were "
+      "not, by cause; with --json it is always there");
   app.add_flag("--json", options.json, "print JSON instead of a table");
   app.add_option("--jobs", options.learning.jobs, "flights evaluated at a time")->check(CLI::Range(1U, 256U));
   try {

@@ -49,6 +49,17 @@ Json json_of(const Totals& t) {
       {"false_alarms_per_hour_95", Json::array({t.false_alarms_per_hour_low, t.false_alarms_per_hour_high})}};
 }
 
+Json json_of(const JudgementLog& judgement, TimePoint start) {
+  Json causes = Json::array();
+  for (const JudgementLog::Muted& cause : judgement.muted()) {
+    Json intervals = Json::array();
+    for (const auto& one : cause.intervals)
+      intervals.push_back(Json::array({to_seconds(one.from - start), to_seconds(one.until - start)}));
+    causes.push_back({{"why", cause.why}, {"seconds", cause.seconds}, {"intervals_s", intervals}});
+  }
+  return causes;
+}
+
 std::map<std::string, std::vector<Score>> by_fault(const Evaluation& evaluation) {
   std::map<std::string, std::vector<Score>> groups;
   for (std::size_t i = 0; i < evaluation.flights.size(); ++i) {
@@ -98,6 +109,27 @@ std::string to_table(const Evaluation& evaluation) {
   return out;
 }
 
+std::string to_muted_table(const Evaluation& evaluation) {
+  std::string out;
+  for (const Flight& flight : evaluation.flights) {
+    const JudgementLog& judgement = flight.judgement;
+    if (!judgement.has_any()) {
+      out += fmt::format("{}: the detector does not tell when it judges\n", flight.name);
+      continue;
+    }
+    out += fmt::format("{}: judged {:.2f} s, muted {:.2f} s\n", flight.name, judgement.judged_s(),
+                       judgement.muted_s());
+    for (const JudgementLog::Muted& cause : judgement.muted()) {
+      out += fmt::format("  {:8.2f} s  {}:", cause.seconds, cause.why);
+      for (const auto& one : cause.intervals)
+        out += fmt::format(" {:.2f}-{:.2f}", to_seconds(one.from - flight.start),
+                           to_seconds(one.until - flight.start));
+      out += '\n';
+    }
+  }
+  return out;
+}
+
 std::string to_json(const Evaluation& evaluation) {
   Json flights = Json::array();
   for (std::size_t i = 0; i < evaluation.flights.size(); ++i) {
@@ -108,7 +140,8 @@ std::string to_json(const Evaluation& evaluation) {
       alarms.push_back({{"time_us", to_us(alarm.time)},
                         {"onset_us", to_us(alarm.onset)},
                         {"component", alarm.component},
-                        {"fault_kind", alarm.fault_kind}});
+                        {"fault_kind", alarm.fault_kind},
+                        {"magnitude", alarm.magnitude}});
     }
     Json row{{"flight", flight.name},
              {"truth", fault_of(flight)},
@@ -119,6 +152,10 @@ std::string to_json(const Evaluation& evaluation) {
              {"healthy_s", score.healthy_s},
              {"duration_s", to_seconds(flight.end - flight.start)},
              {"alarms", alarms}};
+    if (flight.judgement.has_any()) {
+      row["judged_s"] = flight.judgement.judged_s();
+      row["muted"] = json_of(flight.judgement, flight.start);
+    }
     if (flight.truth && flight.truth->onset) row["onset_us"] = to_us(*flight.truth->onset);
     if (score.outcome == Outcome::kTruePositive) row["delay_s"] = score.delay_s;
     flights.push_back(row);

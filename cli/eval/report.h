@@ -16,6 +16,9 @@ struct Evaluation {
 /// One line per flight, totals, and a line per fault type.
 [[nodiscard]] std::string to_table(const Evaluation& evaluation);
 
+/// For each flight how many seconds were judged, and by cause how many and which were not, from its start.
+[[nodiscard]] std::string to_muted_table(const Evaluation& evaluation);
+
 /// {"flights": [...], "totals": {...}}; what is not known is null.
 [[nodiscard]] std::string to_json(const Evaluation& evaluation);
 

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/eval/judgement_log.h"
 #include "core/time/time.h"
 
 namespace airworthy::eval {
@@ -14,6 +16,7 @@ struct Alarm {
   TimePoint onset;  ///< as the detector estimates it
   std::string component;
   std::string fault_kind;
+  double magnitude = std::numeric_limits<double>::quiet_NaN();  ///< in the unit of its kind
 };
 
 /// What really happened in a flight.
@@ -31,6 +34,7 @@ struct Flight {
   TimePoint start;
   TimePoint end;
   std::vector<Alarm> alarms;  ///< in order of time
+  JudgementLog judgement;
 };
 
 struct Rules {

@@ -22,6 +22,7 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
   calibration.vehicle = root.required<std::string>("vehicle");
   calibration.flights = root.optional<int>("flights", 0);
   calibration.used_s = root.optional<double>("used_s", 0.0);
+  calibration.speeds_are_commanded = root.optional<bool>("speeds_are_commanded", false);
   calibration.motor_time_constant_s = root.required<double>("motor_time_constant_s", Range{0.0, 1.0});
   calibration.command_latency_s = root.required<double>("command_latency_s", Range{0.0, 0.2});
   calibration.telemetry_latency_s = root.required<double>("telemetry_latency_s", Range{0.0, 0.2});
@@ -61,15 +62,17 @@ std::string to_toml(const Calibration& calibration) {
       "vehicle = \"{}\"\n"
       "flights = {}\n"
       "used_s = {:.1f}                  # of flight that was used\n"
+      "speeds_are_commanded = {}        # true: no rotor reported its speed, all below follows from "
+      "commands\n"
       "motor_time_constant_s = {:.4g}   # 0: no commands were logged, the vehicle file's counts\n"
       "command_latency_s = {:.4g}       # from the stamp of a command until the speed begins to follow\n"
       "telemetry_latency_s = {:.4g}     # from a speed until the stamp of its report\n"
       "gyro_noise_rad_s = {:.4g}        # of one sample against the model\n"
       "accel_noise_m_s2 = {:.4g}\n"
       "smallest_loss_ratio = {:.2g}     # of one rotor's thrust that is found within a second\n",
-      calibration.vehicle, calibration.flights, calibration.used_s, calibration.motor_time_constant_s,
-      calibration.command_latency_s, calibration.telemetry_latency_s, calibration.gyro_noise_rad_s,
-      calibration.accel_noise_m_s2, calibration.smallest_loss_ratio);
+      calibration.vehicle, calibration.flights, calibration.used_s, calibration.speeds_are_commanded,
+      calibration.motor_time_constant_s, calibration.command_latency_s, calibration.telemetry_latency_s,
+      calibration.gyro_noise_rad_s, calibration.accel_noise_m_s2, calibration.smallest_loss_ratio);
   for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
     const Calibration::Axis& axis = calibration.axis[i];
     text += fmt::format(

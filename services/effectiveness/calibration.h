@@ -23,6 +23,7 @@ struct Calibration {
   int flights = 0;
   double used_s = 0.0;
   std::array<Axis, 3> axis;            ///< roll, pitch, vertical
+  bool speeds_are_commanded = false;   ///< no flight had reports: learned from commands alone
   double motor_time_constant_s = 0.0;  ///< 0 = no commands were logged
   double command_latency_s = 0.0;
   double telemetry_latency_s = 0.0;

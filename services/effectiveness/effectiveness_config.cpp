@@ -22,6 +22,7 @@ void read_input(ConfigTable table, EffectivenessConfig& config) {
   config.monitor.samples_per_s = table.optional<double>("imu_rate_Hz", 500.0, Range{50.0, 8000.0});
   config.monitor.speeds.command_latency = milliseconds("command_latency_ms", 4.0, 100.0);
   config.monitor.speeds.telemetry_latency = milliseconds("telemetry_latency_ms", 10.0, 100.0);
+  config.monitor.learns_inertial_delay = table.optional<bool>("inertial_delay_learned", false);
   config.monitor.most_wait = milliseconds("most_wait_ms", 20.0, 100.0);
   config.monitor.mapping_is_known = table.optional<bool>("rotor_mapping_checked", false);
 }

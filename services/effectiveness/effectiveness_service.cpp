@@ -18,6 +18,20 @@ constexpr Duration kInertialTimeout{200'000};
 constexpr double kPullRatio = 0.005;   // of the filter for the status: half a second back to 1 unseen
 constexpr double kYawVariance = 25.0;  // yaw also answers to rotors that speed up, which the row leaves out
 
+std::string_view name_of(SpeedSource source) {
+  switch (source) {
+    case SpeedSource::kNone:
+      break;
+    case SpeedSource::kTelemetry:
+      return "telemetry";
+    case SpeedSource::kTelemetryAndCommands:
+      return "telemetry_and_commands";
+    case SpeedSource::kCommands:
+      return "commands";
+  }
+  return "nothing";
+}
+
 std::string rotor_name(std::size_t index) { return fmt::format("rotor {}", index + 1); }
 
 LossOfEffectivenessParams<double> filter_params(const EffectivenessParams& monitor) {
@@ -28,6 +42,37 @@ LossOfEffectivenessParams<double> filter_params(const EffectivenessParams& monit
   return params;
 }
 
+/// Empty where the detector judges.
+std::string text_of(Muted muted, Phase phase, std::size_t rotor) {
+  switch (muted) {
+    case Muted::kNot:
+      break;
+    case Muted::kPhase:
+      return fmt::format("not in flight: {}", name_of(phase));
+    case Muted::kSettling:
+      return "settling after take-off or a change of what the speeds are taken from";
+    case Muted::kNoThrust:
+      return "the rotors hardly lift: what one of them lost would not show";
+    case Muted::kStruck:
+      return "pushed from the side: not by a rotor";
+    case Muted::kTooSlow:
+      return "inertial data come less than 50 times a second";
+    case Muted::kNoSpeeds:
+      return "neither rotor speeds nor commands";
+    case Muted::kDelayUnknown:
+      return "not yet known how much later than the rotor speeds the inertial data come";
+    case Muted::kTelemetry:
+      return fmt::format("speed of {} missing, frozen or implausible", rotor_name(rotor));
+    case Muted::kMappingUnknown:
+      return "not yet shown that the rotors are numbered as in the vehicle file";
+    case Muted::kRotorMapping:
+      return "rotor mapping implausible: the vehicle moves as if the rotors were numbered otherwise";
+    case Muted::kRotorLost:
+      return fmt::format("{} is lost: the others cannot be judged", rotor_name(rotor));
+  }
+  return "";
+}
+
 std::vector<evidence_t> evidence_of(const LossEvent& event, const EffectivenessMonitor& monitor) {
   using rt::evidence;
   return {evidence("log_likelihood_ratio", event.evidence, "nat"),
@@ -35,6 +80,8 @@ std::vector<evidence_t> evidence_of(const LossEvent& event, const EffectivenessM
           evidence("second_rotor", event.second, "nat"),
           evidence("unexplained", event.unexplained, "nat"),
           evidence("speed_over_commanded", monitor.speeds().scale(event.rotor), "1"),
+          evidence("speed_from_commands_alone",
+                   monitor.speeds().source() == SpeedSource::kCommands ? 1.0 : 0.0, "1"),
           evidence("sample_age", to_seconds(event.decided - event.sample), "s")};
 }
 
@@ -68,6 +115,7 @@ void EffectivenessService::on_imu(const imu_t& message) {
   const std::array accel{message.accel_m_s2[0], message.accel_m_s2[1], message.accel_m_s2[2]};
   const std::array gyro{message.gyro_rad_s[0], message.gyro_rad_s[1], message.gyro_rad_s[2]};
   handle(monitor_.on_imu(time, accel, gyro, phase));
+  note_source();
   if (phase == Phase::kInFlight) estimate(time, message);
 }
 
@@ -116,29 +164,33 @@ void EffectivenessService::handle(const std::optional<LossEvent>& event) {
 
 std::string EffectivenessService::muted_reason() const {
   if (last_imu_ && tick_ - *last_imu_ > kInertialTimeout) return "inertial data stale";
-  switch (monitor_.muted()) {
-    case Muted::kNot:
-      break;
-    case Muted::kPhase:
-      return fmt::format("not in flight: {}", name_of(phase_.phase().phase()));
-    case Muted::kSettling:
-      return "settling after take-off";
-    case Muted::kStruck:
-      return "pushed from the side: not by a rotor";
-    case Muted::kTooSlow:
-      return "inertial data come less than 150 times a second";
-    case Muted::kNoSpeeds:
-      return "no rotor speeds";
-    case Muted::kTelemetry:
-      return fmt::format("speed of {} missing, frozen or implausible", rotor_name(monitor_.muted_rotor()));
-    case Muted::kMappingUnknown:
-      return "not yet shown that the rotors are numbered as in the vehicle file";
-    case Muted::kRotorMapping:
-      return "rotor mapping implausible: the vehicle moves as if the rotors were numbered otherwise";
-    case Muted::kRotorLost:
-      return fmt::format("{} is lost: the others cannot be judged", rotor_name(*monitor_.lost_rotor()));
-  }
-  return "";
+  return text_of(monitor_.muted(), phase_.phase().phase(), rotor_in_question());
+}
+
+std::size_t EffectivenessService::rotor_in_question() const {
+  return monitor_.lost_rotor().value_or(monitor_.muted_rotor());
+}
+
+void EffectivenessService::observe_judgement(JudgementObserver observer) {
+  judgement_observer_ = std::move(observer);
+  monitor_.observe_judgement(
+      [](void* self, const EffectivenessMonitor::Judgement& judgement) {
+        const auto& service = *static_cast<const EffectivenessService*>(self);
+        service.judgement_observer_(judgement.from, judgement.time,
+                                    text_of(judgement.muted, judgement.phase, service.rotor_in_question()));
+      },
+      this);
+}
+
+void EffectivenessService::note_source() {
+  const SpeedSource source = monitor_.speeds().source();
+  if (source == logged_source_) return;
+  logged_source_ = source;
+  node_.log().info("speed_source_changed", {{"speeds_from", name_of(source)}});
+}
+
+bool EffectivenessService::uses_commands_alone() const {
+  return monitor_.speeds().source() == SpeedSource::kCommands;
 }
 
 rt::DetectorReport EffectivenessService::report() {
@@ -161,7 +213,9 @@ rt::DetectorReport EffectivenessService::report() {
                       LossOfEffectivenessFilter<double>::probability_below(config_.monitor.lost_below_ratio,
                                                                            k, variance),
                       "1"),
-         rt::evidence("effectiveness_found", monitor_.effectiveness(i), "1")}));
+         rt::evidence("effectiveness_found", monitor_.effectiveness(i), "1"),
+         rt::evidence("inertial_delay", to_seconds(monitor_.inertial_delay()), "s"),
+         rt::evidence("speed_from_commands_alone", uses_commands_alone() ? 1.0 : 0.0, "1")}));
   }
   node_.counters()["samples_refused"] = monitor_.times_gone_back() + monitor_.samples_dropped();
   node_.counters()["speeds_refused"] = monitor_.speeds().refused_speeds();

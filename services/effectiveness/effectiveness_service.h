@@ -26,6 +26,11 @@ class EffectivenessService {
   EffectivenessService(const EffectivenessService&) = delete;
   EffectivenessService& operator=(const EffectivenessService&) = delete;
 
+  /// Shows what became of the time between two inertial samples: judged, or why not. For evaluation.
+  using JudgementObserver =
+      std::function<void(TimePoint from, TimePoint until, const std::string& why_muted)>;
+  void observe_judgement(JudgementObserver observer);
+
  private:
   void on_imu(const imu_t& message);
   void on_esc_status(const esc_status_t& message);
@@ -33,7 +38,10 @@ class EffectivenessService {
   void estimate(TimePoint time, const imu_t& message);
   void handle(const std::optional<LossEvent>& event);
   [[nodiscard]] rt::DetectorReport report();
+  void note_source();
   [[nodiscard]] std::string muted_reason() const;
+  [[nodiscard]] std::size_t rotor_in_question() const;
+  [[nodiscard]] bool uses_commands_alone() const;
 
   rt::Node& node_;
   const EffectivenessConfig& config_;
@@ -43,6 +51,8 @@ class EffectivenessService {
   std::optional<TimePoint> last_filtered_;
   std::optional<TimePoint> last_imu_;
   TimePoint tick_{};
+  JudgementObserver judgement_observer_;
+  SpeedSource logged_source_ = SpeedSource::kNone;
   std::array<std::optional<LossKind>, kMaxRotors> raised_{};
   rt::FaultReporter reporter_;
 };

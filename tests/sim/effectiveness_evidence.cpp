@@ -16,7 +16,11 @@ namespace {
 constexpr std::array kManoeuvres{Manoeuvre::kHover, Manoeuvre::kCircle, Manoeuvre::kRandom};
 constexpr std::array kManoeuvreNames{"hover", "circle", "random"};
 
-EffectivenessFlight draw(std::size_t number, FaultKind kind, double magnitude, bool has_fault) {
+/// Whether the rotors report their speeds; without, the detector has the commands alone.
+enum class Telemetry { kReported, kNone };
+
+EffectivenessFlight draw(std::size_t number, FaultKind kind, double magnitude, bool has_fault,
+                         Telemetry telemetry) {
   const std::string name = kVehicles[number % kVehicles.size()];
   Random random{number, "effectiveness evidence"};
   EffectivenessFlight flight;
@@ -25,6 +29,7 @@ EffectivenessFlight draw(std::size_t number, FaultKind kind, double magnitude, b
   flight.realism = Realism::at(Level::kHard);
   flight.realism.wind.mean_m_s = random.uniform(0.0, 10.0);
   flight.seed = 1000 + number;
+  if (telemetry == Telemetry::kNone) flight.telemetry_until_s = 0.0;
   if (has_fault) {
     Fault fault;
     fault.kind = kind;
@@ -48,9 +53,9 @@ void say(const std::vector<Said>& said, double onset_s) {
 }
 
 // Each line: number, vehicle, manoeuvre, rotor, size, whether judged at the onset, ours, its kind, published, clairvoyant.
-void faulty(std::size_t first, std::size_t flights, FaultKind kind, double magnitude) {
+void faulty(std::size_t first, std::size_t flights, FaultKind kind, double magnitude, Telemetry telemetry) {
   for (std::size_t n = first; n < first + flights; ++n) {
-    EffectivenessFlight flight = draw(n, kind, magnitude, true);
+    EffectivenessFlight flight = draw(n, kind, magnitude, true, telemetry);
     if (kind == FaultKind::kPartialLoss) {
       flight.give_up_s = 10.0;
       flight.duration_s = 40.0;
@@ -74,9 +79,9 @@ void faulty(std::size_t first, std::size_t flights, FaultKind kind, double magni
 }
 
 // Each line: number, vehicle, manoeuvre, s off the ground, s judged, take-offs, alarms of ours, of the published filter.
-void healthy(std::size_t first, std::size_t flights, int cycles, double duration_s) {
+void healthy(std::size_t first, std::size_t flights, int cycles, double duration_s, Telemetry telemetry) {
   for (std::size_t n = first; n < first + flights; ++n) {
-    EffectivenessFlight flight = draw(n, FaultKind::kPropellerLost, 0.0, false);
+    EffectivenessFlight flight = draw(n, FaultKind::kPropellerLost, 0.0, false, telemetry);
     flight.cycles = cycles;
     flight.duration_s = duration_s;
     const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
@@ -97,18 +102,23 @@ void healthy(std::size_t first, std::size_t flights, int cycles, double duration
 
 int main(int argc, char** argv) {
   using namespace airworthy::sim;
-  const std::vector<std::string> args(argv + 1, argv + argc);
+  std::vector<std::string> args(argv + 1, argv + argc);
+  Telemetry telemetry = Telemetry::kReported;
+  if (!args.empty() && args.front() == "--without-telemetry") {
+    telemetry = Telemetry::kNone;
+    args.erase(args.begin());
+  }
   const auto number = [&](std::size_t i) { return static_cast<std::size_t>(std::stoul(args.at(i))); };
   if (args.size() == 3 && args[0] == "lost") {
-    faulty(number(1), number(2), FaultKind::kPropellerLost, 1.0);
+    faulty(number(1), number(2), FaultKind::kPropellerLost, 1.0, telemetry);
   } else if (args.size() == 4 && args[0] == "partial") {
-    faulty(number(1), number(2), FaultKind::kPartialLoss, std::stod(args[3]));
+    faulty(number(1), number(2), FaultKind::kPartialLoss, std::stod(args[3]), telemetry);
   } else if (args.size() == 5 && args[0] == "healthy") {
-    healthy(number(1), number(2), static_cast<int>(number(3)), std::stod(args[4]));
+    healthy(number(1), number(2), static_cast<int>(number(3)), std::stod(args[4]), telemetry);
   } else {
     std::fprintf(stderr,
-                 "usage: effectiveness_evidence lost FIRST N | partial FIRST N LOSS | healthy FIRST N CYCLES "
-                 "SECONDS\n");
+                 "usage: effectiveness_evidence [--without-telemetry] lost FIRST N | partial FIRST N LOSS | "
+                 "healthy FIRST N CYCLES SECONDS\n");
     return 64;
   }
   return 0;

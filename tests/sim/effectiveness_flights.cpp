@@ -56,6 +56,7 @@ class Detectors final : public Output {
             EffectivenessOutcome& outcome)
       : rotors_{params.vehicle.rotor_count},
         mischief_{flight.mischief},
+        telemetry_until_s_{flight.telemetry_until_s},
         random_{flight.seed, "mischief"},
         phase_{params.vehicle},
         monitor_{params},
@@ -70,7 +71,7 @@ class Detectors final : public Output {
     if (mischief_ == Mischief::kDuplicates) feed(sample);
   }
   void on_esc(const EscSample& sample) override {
-    if (is_gap(sample.time_s)) return;
+    if (is_gap(sample.time_s) || sample.time_s >= telemetry_until_s_) return;
     feed(sample);
     if (mischief_ == Mischief::kDuplicates) feed(sample);
   }
@@ -164,6 +165,7 @@ class Detectors final : public Output {
 
   std::size_t rotors_;
   Mischief mischief_;
+  double telemetry_until_s_;
   Random random_;
   FlightPhase phase_;
   EffectivenessMonitor monitor_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,7 @@ struct EffectivenessFlight {
   double give_up_s = 1.0;    ///< after the onset
   int cycles = 1;            ///< take-offs and landings, healthy flights only
   Mischief mischief = Mischief::kNone;
+  double telemetry_until_s = std::numeric_limits<double>::infinity();  ///< then no rotor reports any more
   std::uint64_t seed = 1;
 };
 

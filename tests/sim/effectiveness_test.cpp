@@ -131,6 +131,60 @@ TEST(Effectiveness, FrozenOrWrongTelemetryIsNamedAsTelemetry) {
   }
 }
 
+TEST(Effectiveness, WithoutRotorSpeedsTheCommandsWillDo) {
+  for (std::size_t vehicle = 0; vehicle < kVehicles.size(); ++vehicle) {
+    EffectivenessFlight flight = flight_of(kVehicles[vehicle], 31 + vehicle, Manoeuvre::kRandom);
+    flight.telemetry_until_s = 0.0;
+    flight.duration_s = 20.0;
+    const auto params = effectiveness_params(flight.vehicle);
+    const auto healthy = fly(flight, params);
+    EXPECT_TRUE(healthy.ours.empty()) << kVehicles[vehicle];
+    EXPECT_GT(healthy.judged_s, 0.7 * healthy.flown_s) << kVehicles[vehicle];
+    const std::size_t rotor = 1 + vehicle % flight.vehicle.rotor_count;
+    flight.fault =
+        Fault{.kind = FaultKind::kPropellerLost, .onset_s = 10.3, .rotor = rotor, .magnitude = 1.0};
+    const auto lost = fly(flight, params);
+    ASSERT_FALSE(lost.ours.empty()) << kVehicles[vehicle];
+    EXPECT_EQ(lost.ours.front().rotor + 1, rotor) << kVehicles[vehicle];
+    EXPECT_GT(lost.ours.front().time_s, 10.3) << kVehicles[vehicle];
+    EXPECT_LT(lost.ours.front().time_s, 10.3 + 0.06) << kVehicles[vehicle];
+  }
+}
+
+TEST(Effectiveness, TelemetryThatStopsIsNoMotorFault) {
+  for (std::size_t vehicle = 0; vehicle < kVehicles.size(); ++vehicle) {
+    EffectivenessFlight flight = flight_of(kVehicles[vehicle], 51 + vehicle, Manoeuvre::kRandom);
+    flight.telemetry_until_s = 11.0 + 0.0013 * static_cast<double>(vehicle);
+    flight.duration_s = 30.0;
+    const auto params = effectiveness_params(flight.vehicle);
+    const auto healthy = fly(flight, params);
+    EXPECT_TRUE(healthy.ours.empty()) << kVehicles[vehicle];
+    // The commands take over.
+    EXPECT_GT(healthy.judged_s, 0.6 * healthy.flown_s) << kVehicles[vehicle];
+    flight.fault = Fault{.kind = FaultKind::kPropellerLost, .onset_s = 15.2, .rotor = 2, .magnitude = 1.0};
+    const auto lost = fly(flight, params);
+    ASSERT_FALSE(lost.ours.empty()) << kVehicles[vehicle];
+    EXPECT_EQ(lost.ours.front().rotor, 1U) << kVehicles[vehicle];
+    EXPECT_GT(lost.ours.front().time_s, 15.2) << kVehicles[vehicle];
+    EXPECT_LT(lost.ours.front().time_s, 15.2 + 0.06) << kVehicles[vehicle];
+  }
+}
+
+// The motor of a dead speed controller stands, and its telemetry is gone; with one wire for all, that of the others too.
+TEST(Effectiveness, ADeadSpeedControllerIsNoLostPropeller) {
+  for (const bool takes_all : {false, true}) {
+    for (std::size_t vehicle = 0; vehicle < kVehicles.size(); ++vehicle) {
+      EffectivenessFlight flight = flight_of(kVehicles[vehicle], 71 + vehicle, Manoeuvre::kRandom);
+      flight.fault = Fault{.kind = FaultKind::kDeadEsc, .onset_s = 11.0, .rotor = 1 + vehicle % 4};
+      flight.duration_s = 20.0;
+      flight.give_up_s = 5.0;
+      if (takes_all) flight.telemetry_until_s = 11.0;
+      const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+      EXPECT_TRUE(outcome.ours.empty()) << kVehicles[vehicle] << (takes_all ? ", all silent" : "");
+    }
+  }
+}
+
 TEST(Effectiveness, ReadsAPartialLoss) {
   for (const double loss : {0.4, 0.6}) {
     EffectivenessFlight flight = flight_of("bebop2", 3, Manoeuvre::kHover);

@@ -7,7 +7,10 @@ namespace airworthy::effectiveness {
 namespace {
 
 constexpr double kGravity_m_s2 = 9.81;
-constexpr double kLongestStep_s = 0.03;  // a longer gap starts the prediction over
+constexpr double kLongestStep_s = 0.03;  // a longer gap starts the prediction over ...
+constexpr double kGapSteps = 3.0;        // ... where samples come seldom, one of so many steps ...
+constexpr double kMostStep_s = 0.05;     // ... as long as the filters of the axes are valid
+constexpr double kSpeedStep_s = 0.005;   // speeds are followed at least so finely
 constexpr double kFullLoss = 1.1;        // the largest share looked for: the model may be 10 % wrong
 constexpr double kLeastFullLoss = 0.5;   // and the smallest that counts towards a quick decision
 constexpr double kQuickMemory_s = 0.2;
@@ -18,8 +21,13 @@ constexpr double kMostVarianceRatio = 1000.0;
 constexpr double kMeanTime_s = 0.5;
 constexpr double kFirstDisturbance = 0.5;  // standard deviation at first, in shares of one rotor
 constexpr double kTiltInterval_s = 0.05;
+constexpr double kArrivalError = 0.5;  // of a step, standard deviation of stamps of arrival
 constexpr double kMappingPeriod_s = 1.0;
-constexpr double kMappingKeep = 0.98;  // a second: a mapping is learned within a minute
+constexpr Duration kDelayChange{3'000};  // smaller ones are not worth a new start
+constexpr double kMappingKeep = 0.98;    // a second: a mapping is learned within a minute
+constexpr double kLeastLift =
+    0.15;  // of the weight: less, and a lost rotor is within what the model never explains
+constexpr double kHardlyLifts_s = 0.05;
 constexpr double kBlow = 1.5;  // times all that all rotors give: no loss changes so much within a sample
 constexpr double kBlowSigmas = 8.0;
 constexpr double kLateralSlow_s = 0.5;
@@ -27,8 +35,8 @@ constexpr double kLateralFast_s = 0.006;
 constexpr double kLateralVariance_s = 2.0;
 constexpr double kPush_m_s2 = 3.0;
 constexpr double kPushSigmas = 5.0;
-constexpr Duration kStruck{150'000};  // and what follows
-constexpr double kLeastRate_Hz = 150.0;
+constexpr Duration kStruck{150'000};    // and what follows
+constexpr double kLeastRate_Hz = 50.0;  // below, usual gaps exceed what the filters of the axes hold for
 constexpr Duration kLeastAge{4'000};    // of the evidence: a blow shows within a sample, a loss builds up
 constexpr double kSurelyPartial = 0.5;  // effectiveness that no lost propeller shows ...
 constexpr Duration kEarliestPartial{15'000};  // ... after so long
@@ -62,7 +70,8 @@ EffectivenessMonitor::EffectivenessMonitor(const EffectivenessParams& params) no
     : params_{params},
       speeds_{params.speeds},
       test_{params.vehicle.rotor_count, test_params_of(params), ranges_of(params)},
-      tilt_{params.vehicle.rotor_count, std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)} {
+      tilt_{params.vehicle.rotor_count, std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)},
+      delay_{std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)} {
   effectiveness_.fill(1.0);
   const std::size_t n = params_.vehicle.rotor_count;
   constexpr std::array kRows{kRollRow, kPitchRow, kVerticalRow};
@@ -90,6 +99,8 @@ EffectivenessMonitor::EffectivenessMonitor(const EffectivenessParams& params) no
   hover_speed_sum_ = std::sqrt(hover_speed2) * static_cast<double>(n);
   timing_error_s_ =
       params_.noise.latency_error_s + params_.noise.lag_error_ratio * params_.speeds.time_constant_s;
+  unheard_timing_error_s_ = params_.noise.unheard_latency_error_s +
+                            params_.noise.unheard_lag_error_ratio * params_.speeds.time_constant_s;
   const auto adaptive = [](double sigma) {
     const double guess = sigma * sigma;
     return AdaptiveVariance<double>{guess, kLeastVarianceRatio * guess, kMostVarianceRatio * guess,
@@ -119,12 +130,21 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
     return std::nullopt;
   }
   last_imu_ = time;
+  // From here on, times are those of the rotor speeds.
+  const TimePoint moved = time - inertial_delay_;
+  if (params_.learns_inertial_delay)
+    learn_delay({time, accel_m_s2, gyro_rad_s, phase}, phase == Phase::kInFlight);
+  if (last_moved_ && moved <= *last_moved_) {  // the delay has just grown
+    ++dropped_;
+    return std::nullopt;
+  }
+  last_moved_ = moved;
   if (waiting_count_ == kWaiting) {
     waiting_first_ = (waiting_first_ + 1) % kWaiting;
     --waiting_count_;
     ++dropped_;
   }
-  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {time, accel_m_s2, gyro_rad_s, phase};
+  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {moved, accel_m_s2, gyro_rad_s, phase};
   ++waiting_count_;
   return process(time);
 }
@@ -159,10 +179,49 @@ std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
 }
 
 void EffectivenessMonitor::watch_input(const Inertial& sample, double dt_s) noexcept {
-  mean_step_s_ += 0.01 * (std::min(dt_s, kLongestStep_s) - mean_step_s_);
+  mean_step_s_ += 0.01 * (std::min(dt_s, kMostStep_s) - mean_step_s_);
+  double lift_m_s2 = 0.0;
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i)
+    lift_m_s2 -= params_.effectiveness.per_speed2[kVerticalRow][i] * mean_speed2_[i];
+  hardly_lifts_s_ = lift_m_s2 < kLeastLift * kGravity_m_s2 ? hardly_lifts_s_ + dt_s : 0.0;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     if (lateral_[axis].step(sample.accel_m_s2[axis], dt_s)) struck_ = sample.time;
   }
+}
+
+double EffectivenessMonitor::longest_step_s() const noexcept {
+  return std::clamp(kGapSteps * mean_step_s_, kLongestStep_s, kMostStep_s);
+}
+
+void EffectivenessMonitor::watch_source(TimePoint time) noexcept {
+  const SpeedSource source = speeds_.source();
+  const bool was_heard = source_ == SpeedSource::kTelemetry || source_ == SpeedSource::kTelemetryAndCommands;
+  const bool is_heard = source == SpeedSource::kTelemetry || source == SpeedSource::kTelemetryAndCommands;
+  if (source_ != SpeedSource::kNone && was_heard != is_heard) {
+    source_since_ = time;
+    needs_start_ = true;
+  }
+  source_ = source;
+}
+
+bool EffectivenessMonitor::advance_speeds(TimePoint time) noexcept {
+  const std::size_t n = params_.vehicle.rotor_count;
+  const Duration whole = last_processed_ ? time - *last_processed_ : Duration{0};
+  const bool is_long = to_seconds(whole) > longest_step_s();
+  const int parts = is_long ? 1 : 1 + static_cast<int>(to_seconds(whole) / kSpeedStep_s);
+  std::array<double, kMaxRotors> sum{};
+  for (int k = 1; k <= parts; ++k) {
+    std::array<double, kMaxRotors> before{};
+    for (std::size_t i = 0; i < n; ++i) before[i] = speeds_.speed(i);
+    if (!speeds_.advance(time - whole + whole * k / parts)) return false;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double now = speeds_.speed(i);
+      sum[i] += 0.5 * (now * now + before[i] * before[i]);
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) mean_speed2_[i] = sum[i] / parts;
+  watch_source(time);
+  return true;
 }
 
 bool EffectivenessMonitor::is_blow(const MotionSample<double>& motion) const noexcept {
@@ -189,16 +248,64 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
   if (mean_step_s_ > 1.0 / kLeastRate_Hz) return Muted::kTooSlow;
   if (struck_ && sample.time - *struck_ < kStruck) return Muted::kStruck;
   using Telemetry = RotorSpeedPredictor<double>::Telemetry;
-  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+  const bool reports = source_ != SpeedSource::kCommands;
+  for (std::size_t i = 0; reports && i < params_.vehicle.rotor_count; ++i) {
     const Telemetry state = speeds_.telemetry(i, sample.time);
     if (state == Telemetry::kGood) continue;
     muted_rotor_ = i;
     return Muted::kTelemetry;
   }
   if (!in_flight_since_) in_flight_since_ = sample.time;
+  if (params_.learns_inertial_delay && !delay_is_known_) return Muted::kDelayUnknown;
   if (mapping_ == Mapping::kWrongNumbers) return Muted::kRotorMapping;
   if (sample.time - *in_flight_since_ < params_.settle) return Muted::kSettling;
+  if (hardly_lifts_s_ > kHardlyLifts_s) return Muted::kNoThrust;
+  // What was lost together with the reports is taken into the disturbance, and overturns within seconds what cannot
+  // fly without it: the reports are missing, not a propeller.
+  const Duration settle = source_ == SpeedSource::kCommands ? params_.settle_partial : params_.settle;
+  if (source_since_ && sample.time - *source_since_ < settle) return Muted::kSettling;
   return mapping_was_plausible_ || params_.mapping_is_known ? Muted::kNot : Muted::kMappingUnknown;
+}
+
+void EffectivenessMonitor::learn_delay(const Inertial& sample, bool in_flight) noexcept {
+  if (!in_flight || lost_) {
+    delay_.interrupt();
+    delay_added_.reset();
+    delayed_count_ = 0;
+    return;
+  }
+  if (delayed_count_ == kWaiting) {
+    delayed_first_ = (delayed_first_ + 1) % kWaiting;
+    --delayed_count_;
+  }
+  delayed_[(delayed_first_ + delayed_count_) % kWaiting] = sample;
+  ++delayed_count_;
+  while (delayed_count_ > 0 && delayed_[delayed_first_].time <= speeds_.now()) {
+    add_to_delay(delayed_[delayed_first_]);
+    delayed_first_ = (delayed_first_ + 1) % kWaiting;
+    --delayed_count_;
+  }
+  const auto learned = delay_.delay();
+  if (!learned || (delay_is_known_ && std::chrono::abs(*learned - inertial_delay_) < kDelayChange)) return;
+  delay_is_known_ = true;
+  inertial_delay_ = *learned;
+  needs_start_ = true;
+}
+
+void EffectivenessMonitor::add_to_delay(const Inertial& sample) noexcept {
+  const double dt_s = delay_added_ ? to_seconds(sample.time - *delay_added_) : 0.0;
+  delay_added_ = sample.time;
+  if (dt_s > longest_step_s()) delay_.interrupt();
+  StreamDelay<double>::Accelerations u{};
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    const TimePoint then = sample.time - StreamDelay<double>::kStep * static_cast<int>(k);
+    for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+      const double speed = speeds_.speed_at(i, then);
+      u[k][0] += params_.effectiveness.per_speed2[kRollRow][i] * speed * speed;
+      u[k][1] += params_.effectiveness.per_speed2[kPitchRow][i] * speed * speed;
+    }
+  }
+  delay_.add(dt_s, {sample.gyro_rad_s[0], sample.gyro_rad_s[1]}, u);
 }
 
 void EffectivenessMonitor::start(const Inertial& sample) noexcept {
@@ -213,7 +320,7 @@ void EffectivenessMonitor::start(const Inertial& sample) noexcept {
 }
 
 void EffectivenessMonitor::watch_mapping(const Inertial& sample, double dt_s) noexcept {
-  if (dt_s > kLongestStep_s) tilt_.interrupt();
+  if (dt_s > longest_step_s()) tilt_.interrupt();
   tilt_.add(dt_s, speeds_.speeds(), sample.gyro_rad_s, sample.accel_m_s2[2]);
   mapping_age_s_ += dt_s;
   if (mapping_age_s_ < kMappingPeriod_s) return;
@@ -231,6 +338,12 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   motion.time = sample.time;
   std::array<double, 3> u{};
   std::array<double, 3> timing_variance{};
+  std::array<double, 3> gap_variance{};
+  // A stamp of arrival says when within a step: what turns so fast was measured elsewhere by so much.
+  const double stamp_error_s = params_.learns_inertial_delay ? kArrivalError * mean_step_s_ : 0.0;
+  const double timing_error_s =
+      (source_ == SpeedSource::kCommands ? unheard_timing_error_s_ : timing_error_s_) + stamp_error_s;
+  double lift_change = 0.0;  // of what the rotors give, each second
   double speed_sum = 0.0;
   for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
     const double speed = speeds_.speed(i);
@@ -240,16 +353,19 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     // A rotor that the turning body moves along its axis meets air that much faster.
     const double inflow = inflow_per_rate_[i][0] * rate_[0].rate() + inflow_per_rate_[i][1] * rate_[1].rate();
     // A rate answers to the mean over the step, a force to its end.
-    const double mean = std::max(0.0, 0.5 * (speed * speed + before * before) - speed * inflow);
+    const double mean = std::max(0.0, mean_speed2_[i] - speed * inflow);
     const double now = std::max(0.0, speed * (speed - inflow));
-    const double late = std::abs(speed * speed - before * before) / dt_s * timing_error_s_;
+    const double late = std::abs(speed * speed - before * before) / dt_s * timing_error_s;
+    const double gap = 2.0 * speed * speeds_.gap_sigma(i);
     const std::array b{effectiveness_[i] * B[kRollRow][i], effectiveness_[i] * B[kPitchRow][i],
                        effectiveness_[i] * vertical_at_imu_[i]};
     motion.contribution[i] = {b[0] * mean, b[1] * mean, b[2] * now};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       u[axis] += motion.contribution[i][axis];
       timing_variance[axis] += b[axis] * b[axis] * late * late;
+      gap_variance[axis] += b[axis] * b[axis] * gap * gap;
     }
+    lift_change += b[2] * (speed * speed - before * before) / dt_s;
   }
   const auto& inertia = params_.vehicle.inertia_kg_m2;
   const auto& w = sample.gyro_rad_s;
@@ -258,14 +374,15 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     u[1] += (inertia[2] - inertia[0]) / inertia[1] * w[0] * w[2];
   }
   const auto square = [](double value) { return value * value; };
+  const double gap_s = 0.5 * speeds_.command_interval_s();  // over which what gaps hide is correlated
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double net = u[axis] + rate_[axis].disturbance();
     const double variance = square(noise.acceleration_ratio * authority_[axis]) +
                             square(noise.gain_error_ratio * net) + timing_variance[axis];
-    motion.rate[axis] = rate_[axis].step(
-        dt_s, u[axis], sample.gyro_rad_s[axis],
-        {2.0 * variance * noise.correlation_s, square(noise.disturbance_ratio_per_sqrt_s * authority_[axis])},
-        gyro_variance_[axis].value);
+    motion.rate[axis] = rate_[axis].step(dt_s, u[axis], sample.gyro_rad_s[axis],
+                                         {2.0 * (variance * noise.correlation_s + gap_variance[axis] * gap_s),
+                                          square(noise.disturbance_ratio_per_sqrt_s * authority_[axis])},
+                                         gyro_variance_[axis].value + square(stamp_error_s * net));
     gyro_variance_[axis].step(motion.rate[axis].innovation, motion.rate[axis].variance, dt_s);
   }
   // The accelerometer beside the centre of mass also feels the body turn faster.
@@ -277,25 +394,39 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   mean_vertical_m_s2_ += dt_s / (kMeanTime_s + dt_s) * (u[2] - mean_vertical_m_s2_);
   const double change = noise.gain_error_ratio * (u[2] - mean_vertical_m_s2_);
   const double density = square(noise.vertical_ratio_per_sqrt_s * authority_[2]) +
-                         2.0 * (timing_variance[2] + square(change)) / noise.vertical_correlation_s;
-  motion.vertical = vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(),
-                                   sample.accel_m_s2[2], density, accel_variance_.value);
+                         2.0 * (timing_variance[2] + square(change)) / noise.vertical_correlation_s +
+                         2.0 * gap_variance[2] / std::max(gap_s, noise.vertical_correlation_s);
+  motion.vertical =
+      vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(), sample.accel_m_s2[2],
+                     density, accel_variance_.value + square(stamp_error_s * lift_change));
   accel_variance_.step(motion.vertical.innovation, motion.vertical.variance, dt_s);
   return motion;
 }
 
 std::optional<LossEvent> EffectivenessMonitor::step(const Inertial& sample, TimePoint now) noexcept {
-  if (!speeds_.advance(sample.time)) {
+  const TimePoint before = last_processed_.value_or(sample.time);
+  std::optional<LossEvent> event;
+  if (advance_speeds(sample.time)) {
+    event = judge(sample, to_seconds(sample.time - before), now);
+  } else {
     muted_ = Muted::kNoSpeeds;
-    return std::nullopt;
   }
+  last_processed_ = sample.time;
+  if (judgement_observer_ != nullptr) {
+    judgement_observer_(judgement_context_,
+                        {before, sample.time, event ? Muted::kNot : muted_, sample.phase, muted_rotor_});
+  }
+  return event;
+}
+
+std::optional<LossEvent> EffectivenessMonitor::judge(const Inertial& sample, double dt_s,
+                                                     TimePoint now) noexcept {
   const Muted before = muted_;
-  const double dt_s = last_processed_ ? to_seconds(sample.time - *last_processed_) : 0.0;
   watch_input(sample, dt_s);
   muted_ = reason(sample);
-  last_processed_ = sample.time;
   const auto runs = [](Muted muted) {
-    return muted == Muted::kNot || muted == Muted::kSettling || muted == Muted::kMappingUnknown;
+    return muted == Muted::kNot || muted == Muted::kSettling || muted == Muted::kNoThrust ||
+           muted == Muted::kMappingUnknown;
   };
   if (runs(muted_) || muted_ == Muted::kRotorMapping) {
     watch_mapping(sample, dt_s);
@@ -303,8 +434,10 @@ std::optional<LossEvent> EffectivenessMonitor::step(const Inertial& sample, Time
     tilt_.interrupt();
   }
   if (!runs(muted_)) return std::nullopt;
-  if (!runs(before) || dt_s > kLongestStep_s) {
-    if (!runs(before)) {
+  const bool starts = !runs(before) || needs_start_;
+  if (starts || dt_s > longest_step_s()) {
+    needs_start_ = false;
+    if (starts) {
       start(sample);
     } else {
       for (std::size_t axis = 0; axis < 2; ++axis)
@@ -317,10 +450,14 @@ std::optional<LossEvent> EffectivenessMonitor::step(const Inertial& sample, Time
   const MotionSample<double> motion = innovate(sample, dt_s);
   if (is_blow(motion)) {
     struck_ = sample.time;
+    muted_ = Muted::kStruck;
     test_.reset();
     return std::nullopt;
   }
-  if (muted_ != Muted::kNot) return std::nullopt;
+  if (muted_ != Muted::kNot) {
+    test_.reset();
+    return std::nullopt;
+  }
   judged_s_ += dt_s;
   if (observer_ != nullptr) observer_(observer_context_, motion, now);
   test_.step(motion);
@@ -342,6 +479,8 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   }
   const Duration age = sample.time - finding->onset;
   if (age < kLeastAge) return std::nullopt;
+  // A rotor that falls silent may stand still: that is for its next report to say.
+  if (source_ != SpeedSource::kCommands && speeds_.is_overdue(finding->rotor, now)) return std::nullopt;
   LossEvent event;
   event.rotor = finding->rotor;
   event.effectiveness = effectiveness_[event.rotor] * (1.0 - finding->loss);

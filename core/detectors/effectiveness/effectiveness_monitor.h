@@ -14,6 +14,7 @@
 #include "core/estimators/effectiveness/effectiveness_matrix.h"
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "core/estimators/effectiveness/rotor_speed_predictor.h"
+#include "core/estimators/effectiveness/stream_delay.h"
 
 namespace airworthy::effectiveness {
 
@@ -30,6 +31,8 @@ struct ModelNoise {
   double lag_error_ratio = 0.1;  ///< of the motors' time constant ...
   double latency_error_s =
       0.001;  ///< ... and of commands: speeds that change are known so much too late or early
+  double unheard_lag_error_ratio = 0.3;       ///< the same of motors whose speeds nobody reports ...
+  double unheard_latency_error_s = 0.003;     ///< ... and of their commands
   double disturbance_ratio_per_sqrt_s = 0.1;  ///< gusts: how fast an outer moment or force wanders
   double vertical_ratio_per_sqrt_s = 0.6;     ///< climbing changes the thrust of all rotors
   double gyro_rad_s = 0.03;                   ///< first guess; adapts
@@ -47,9 +50,10 @@ struct EffectivenessParams {
   double lost_below_ratio = 0.3;   ///< effectiveness of what counts as lost
   double lost_probability = 0.9;
   bool mapping_is_known = false;       ///< as after a calibration: no need to wait for proof in flight
+  bool learns_inertial_delay = false;  ///< the streams are stamped on arrival: see StreamDelay
   Duration most_wait{20'000};          ///< for the inputs that explain a sample
   Duration settle{500'000};            ///< in flight before a great loss is looked for
-  Duration settle_partial{3'000'000};  ///< and before a partial one is
+  Duration settle_partial{3'000'000};  ///< and before a partial one is, or anything once reports have stopped
   Duration most_classifying{
       30'000};  ///< from the onset until what is not surely lost is called a partial loss
 };
@@ -58,9 +62,11 @@ enum class Muted : std::uint8_t {
   kNot,
   kPhase,  ///< on ground, taking off, landing, contact
   kSettling,
-  kStruck,   ///< pushed from the side, as no rotor can
-  kTooSlow,  ///< inertial data come less often than kLeastRate_Hz
-  kNoSpeeds,
+  kNoThrust,        ///< the rotors hardly lift: what one of them lost would not show
+  kStruck,          ///< pushed from the side, as no rotor can
+  kTooSlow,         ///< inertial data come less often than kLeastRate_Hz
+  kNoSpeeds,        ///< neither reports nor commands
+  kDelayUnknown,    ///< not yet known how much later than the speeds the inertial data come
   kTelemetry,       ///< of one rotor implausible, frozen or missing
   kMappingUnknown,  ///< nothing has yet shown that the rotors are numbered as described
   kRotorMapping,    ///< the vehicle moves as if the rotors were numbered otherwise
@@ -111,6 +117,21 @@ class EffectivenessMonitor {
   std::optional<LossEvent> on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept;
   std::optional<LossEvent> on_commands(TimePoint time, std::span<const double> command_ratio) noexcept;
 
+  /// What became of an inertial sample.
+  struct Judgement {
+    TimePoint from;  ///< of the sample before
+    TimePoint time;
+    Muted muted;  ///< kNot: it took part in the test, or restarted it after a gap
+    Phase phase;
+    std::size_t muted_rotor;
+  };
+  /// Shows every sample in order of time: for evaluation.
+  using JudgementObserver = void (*)(void* context, const Judgement& judgement);
+  void observe_judgement(JudgementObserver observer, void* context) noexcept {
+    judgement_observer_ = observer;
+    judgement_context_ = context;
+  }
+
   /// Shows every sample that is judged, before the judgement: for evaluation.
   using Observer = void (*)(void* context, const MotionSample<double>& sample, TimePoint now);
   void observe(Observer observer, void* context) noexcept {
@@ -128,6 +149,8 @@ class EffectivenessMonitor {
   [[nodiscard]] double effectiveness(std::size_t i) const noexcept { return effectiveness_[i]; }
   [[nodiscard]] std::optional<std::size_t> lost_rotor() const noexcept { return lost_; }
   [[nodiscard]] Mapping mapping() const noexcept { return mapping_; }
+  /// How much later than the rotor speeds the inertial data are stamped, as learned; 0 where it is not.
+  [[nodiscard]] Duration inertial_delay() const noexcept { return inertial_delay_; }
   [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
   [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
@@ -145,7 +168,13 @@ class EffectivenessMonitor {
   std::optional<LossEvent> step(const Inertial& sample, TimePoint now) noexcept;
   [[nodiscard]] Muted reason(const Inertial& sample) noexcept;
   [[nodiscard]] bool is_blow(const MotionSample<double>& motion) const noexcept;
+  std::optional<LossEvent> judge(const Inertial& sample, double dt_s, TimePoint now) noexcept;
+  [[nodiscard]] bool advance_speeds(TimePoint time) noexcept;
+  [[nodiscard]] double longest_step_s() const noexcept;
   void watch_input(const Inertial& sample, double dt_s) noexcept;
+  void watch_source(TimePoint time) noexcept;
+  void learn_delay(const Inertial& sample, bool in_flight) noexcept;
+  void add_to_delay(const Inertial& sample) noexcept;
   void start(const Inertial& sample) noexcept;
   void watch_mapping(const Inertial& sample, double dt_s) noexcept;
   [[nodiscard]] MotionSample<double> innovate(const Inertial& sample, double dt_s) noexcept;
@@ -163,28 +192,44 @@ class EffectivenessMonitor {
   std::array<double, 3> authority_{};  ///< acceleration that one rotor gives in hover
   std::array<double, kMaxRotors> effectiveness_{};
   std::array<double, kMaxRotors> speed_before_{};
+  std::array<double, kMaxRotors> mean_speed2_{};  ///< since the sample before
   std::array<std::array<double, 2>, kMaxRotors> inflow_per_rate_{};
   std::array<double, kMaxRotors> vertical_at_imu_{};
   double hover_speed_sum_ = 1.0;
   double timing_error_s_ = 0.0;
+  double unheard_timing_error_s_ = 0.0;
   double mean_vertical_m_s2_ = 0.0;  ///< that the rotors give, slow
 
   std::array<Inertial, kWaiting> waiting_{};
   std::size_t waiting_first_ = 0;
   std::size_t waiting_count_ = 0;
-  std::optional<TimePoint> last_imu_;
+  std::optional<TimePoint> last_imu_;    ///< as stamped
+  std::optional<TimePoint> last_moved_;  ///< less the delay
   std::optional<TimePoint> last_processed_;
   std::optional<TimePoint> in_flight_since_;
+  SpeedSource source_ = SpeedSource::kNone;
+  bool needs_start_ = false;
+  std::optional<TimePoint> source_since_;  ///< speeds come from commands alone, or no longer do
   std::optional<std::size_t> lost_;
   std::array<LateralForce, 2> lateral_;
   std::optional<TimePoint> struck_;
   double mean_step_s_ = 0.0;
+  double hardly_lifts_s_ = 0.0;
   ControlRegression<double> tilt_;
+  StreamDelay<double> delay_;
+  std::array<Inertial, kWaiting> delayed_{};  ///< wait for what the speeds were at their stamps
+  std::size_t delayed_first_ = 0;
+  std::size_t delayed_count_ = 0;
+  std::optional<TimePoint> delay_added_;
+  Duration inertial_delay_{0};
+  bool delay_is_known_ = false;
   Mapping mapping_ = Mapping::kUnknown;
   bool mapping_was_plausible_ = false;
   double mapping_age_s_ = 0.0;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
+  JudgementObserver judgement_observer_ = nullptr;
+  void* judgement_context_ = nullptr;
   bool reported_in_air_ = false;
   bool cautious_ = false;  ///< perhaps touching the ground
   Muted muted_ = Muted::kNoSpeeds;

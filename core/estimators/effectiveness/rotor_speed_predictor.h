@@ -25,11 +25,23 @@ struct RotorSpeedParams {
   Scalar scale_time_s = Scalar(0.5);        ///< and the speed that a command gives
 };
 
+/// What the speeds are taken from.
+enum class SpeedSource : std::uint8_t {
+  kNone,
+  kTelemetry,             ///< reports alone
+  kTelemetryAndCommands,  ///< commands between reports, corrected by them
+  kCommands,              ///< no rotor reports: what was commanded, through the lag of the motors
+};
+
 /// Rotor speeds at the moment of an inertial sample, from commands that come before their effect and telemetry
 /// that comes late, slow and noisy.
 ///   Motor       ω̇ = (s·ω*(t − t_c) − ω)/τ,  ω* between two commands linear; trapezoidal rule                (1)
 ///   Telemetry   e = ω_tel − ω(t − t_t);  ω ← ω + K·e,  s ← s + K_s·e/ω*,  K = 1 − Δt-weighted forgetting       (2)
 ///   Without commands  ω = telemetry, linear between two, the newest held                                 (3)
+///   Without telemetry (1) alone, with the last s, once no rotor has reported for 0.25 s. A rotor that is silent while
+///               others report is not taken for one without telemetry: its motor may stand             (5)
+///   Gaps of (5) commands that come every T are not known between: a random walk of their own diffusion D, estimated from
+///               their changes, leaves σ² = D·(T/6 + time since the newest)                             (6)
 ///   Symbols     τ → time_constant_s; t_c, t_t → latencies; s → scale: battery sag and command curve
 ///   Plausible   a reported speed is refused beyond 1.6 full speeds, or if it jumps by more than a third of
 ///               full speed from the last one less than 50 ms ago, until three in a row agree               (4)
@@ -51,6 +63,7 @@ class RotorSpeedPredictor {
       sample.value[i] = params_.speed_min_rad_s + std::clamp(command_ratio[i], Scalar{0}, Scalar{1}) *
                                                       (params_.speed_max_rad_s - params_.speed_min_rad_s);
     }
+    watch_changes(sample);
     commands_.push(sample);
   }
 
@@ -60,6 +73,7 @@ class RotorSpeedPredictor {
     if (speed_rad_s.size() != params_.rotor_count) return refuse();
     if (speeds_.size > 0 && time == speeds_.newest().time) return join_newest(time, speed_rad_s);
     if (!newer(speeds_, time)) return refuse();
+    for (std::size_t i = 0; i < params_.rotor_count; ++i) hear(i, time, speed_rad_s[i]);
     Sample sample{time, {}};
     bool any = false;
     for (std::size_t i = 0; i < params_.rotor_count; ++i) {
@@ -81,15 +95,14 @@ class RotorSpeedPredictor {
 
   /// Moves to `time`, not before the last; false while no speed is known.
   [[nodiscard]] bool advance(TimePoint time) noexcept {
-    if (speeds_.size == 0 && commands_.size == 0) return false;
-    const bool by_commands =
-        commands_.size > 0 && time - commands_.newest().time < kCommandsFresh && speeds_.size > 0;
-    if (!by_commands && speeds_.size == 0) return false;
-    if (!started_ || time - now_ > kLongestStep || by_commands != by_commands_) restart(time, by_commands);
+    const SpeedSource source = source_at(time);
+    if (source == SpeedSource::kNone) return false;
+    if (source_ == SpeedSource::kNone || time - now_ > kLongestStep || source != source_)
+      restart(time, source);
     const Scalar dt_s = static_cast<Scalar>(to_seconds(time - now_));
-    if (by_commands) {
+    if (uses_commands()) {
       follow_commands(time, dt_s);
-      correct(time);
+      if (source_ == SpeedSource::kTelemetryAndCommands) correct(time);
     } else {
       for (std::size_t i = 0; i < params_.rotor_count; ++i) speed_[i] = reported(i, time);
     }
@@ -102,11 +115,31 @@ class RotorSpeedPredictor {
   [[nodiscard]] std::span<const Scalar> speeds() const noexcept {
     return std::span{speed_}.first(params_.rotor_count);
   }
+  /// What the speed was at a time not long ago.
+  [[nodiscard]] Scalar speed_at(std::size_t i, TimePoint time) const noexcept { return history_.at(i, time); }
+  [[nodiscard]] TimePoint now() const noexcept { return now_; }
   /// s of (2).
   [[nodiscard]] Scalar scale(std::size_t i) const noexcept { return scale_[i]; }
   /// How far the prediction reaches beyond what is known.
   [[nodiscard]] Duration staleness() const noexcept { return std::max(Duration{0}, now_ - known_until()); }
-  [[nodiscard]] bool uses_commands() const noexcept { return by_commands_; }
+  [[nodiscard]] SpeedSource source() const noexcept { return source_; }
+  [[nodiscard]] bool uses_commands() const noexcept {
+    return source_ == SpeedSource::kTelemetryAndCommands || source_ == SpeedSource::kCommands;
+  }
+  /// σ of (6) now, rad/s; 0 unless the speeds come from commands alone.
+  [[nodiscard]] Scalar gap_sigma(std::size_t i) const noexcept {
+    if (source_ != SpeedSource::kCommands) return Scalar{0};
+    const Scalar beyond_s = static_cast<Scalar>(to_seconds(staleness()));
+    return scale_[i] * std::sqrt(change_[i] * (command_interval_s_ / Scalar{6} + beyond_s));
+  }
+  /// T of (6).
+  [[nodiscard]] Scalar command_interval_s() const noexcept { return command_interval_s_; }
+  /// Whether a report of rotor i should have come since the last one, by its own mean interval.
+  [[nodiscard]] bool is_overdue(std::size_t i, TimePoint now) const noexcept {
+    const Report& report = report_[i];
+    return report.heard &&
+           to_seconds(now - report.heard_at) > static_cast<double>(kOverdue * report.interval_s);
+  }
   [[nodiscard]] Telemetry telemetry(std::size_t i, TimePoint now) const noexcept {
     const Report& report = report_[i];
     if (report.refused_share > kMostRefused) return Telemetry::kImplausible;
@@ -120,6 +153,10 @@ class RotorSpeedPredictor {
  private:
   static constexpr std::size_t kHistory = 32;
   static constexpr Duration kCommandsFresh{100'000};
+  static constexpr Duration kCommandsLast{250'000};  // without telemetry
+  static constexpr Scalar kChangeTime_s = Scalar(1);
+  static constexpr Scalar kIntervalShare = Scalar(0.05);  // of the newest in its running mean
+  static constexpr Scalar kOverdue = Scalar(2);           // intervals
   static constexpr Duration kLongestStep{100'000};
   static constexpr Duration kJumpWithin{50'000};
   static constexpr Duration kMissingAfter{250'000};
@@ -180,7 +217,48 @@ class RotorSpeedPredictor {
     int disagreeing = 0;
     Scalar candidate = 0;
     Scalar refused_share = 0;
+    bool heard = false;  // accepted or not
+    TimePoint heard_at{};
+    Scalar interval_s = 0;
   };
+
+  void hear(std::size_t i, TimePoint time, Scalar speed) noexcept {
+    if (!std::isfinite(speed)) return;
+    Report& report = report_[i];
+    if (report.heard && time - report.heard_at < kMissingAfter) {
+      const Scalar since_s = static_cast<Scalar>(to_seconds(time - report.heard_at));
+      const bool is_first = !(report.interval_s > Scalar{0});
+      report.interval_s += (is_first ? Scalar{1} : kIntervalShare) * (since_s - report.interval_s);
+    }
+    report.heard = true;
+    report.heard_at = time;
+  }
+
+  void watch_changes(const Sample& sample) noexcept {  // D and T of (6)
+    if (commands_.size == 0) return;
+    const Sample& before = commands_.newest();
+    const Scalar dt_s = static_cast<Scalar>(to_seconds(sample.time - before.time));
+    if (sample.time - before.time > kCommandsLast) return;
+    const bool is_first = !(command_interval_s_ > Scalar{0});
+    command_interval_s_ += (is_first ? Scalar{1} : kIntervalShare) * (dt_s - command_interval_s_);
+    const Scalar share = dt_s / (kChangeTime_s + dt_s);
+    for (std::size_t i = 0; i < params_.rotor_count; ++i) {
+      const Scalar change = sample.value[i] - before.value[i];
+      change_[i] += share * (change * change / dt_s - change_[i]);
+    }
+  }
+
+  [[nodiscard]] SpeedSource source_at(TimePoint time) const noexcept {
+    const auto within = [&](Duration age) {
+      return commands_.size > 0 && time - commands_.newest().time < age;
+    };
+    bool reports = false;
+    for (std::size_t i = 0; i < params_.rotor_count; ++i)
+      reports = reports || (report_[i].heard && time - report_[i].heard_at < kMissingAfter);
+    if (!reports && within(kCommandsLast)) return SpeedSource::kCommands;  // (5)
+    if (speeds_.size == 0) return SpeedSource::kNone;
+    return within(kCommandsFresh) ? SpeedSource::kTelemetryAndCommands : SpeedSource::kTelemetry;
+  }
 
   void join_newest(TimePoint time, std::span<const Scalar> speed_rad_s) noexcept {
     Sample& newest = speeds_.newest();
@@ -189,9 +267,10 @@ class RotorSpeedPredictor {
       if (!std::isfinite(speed_rad_s[i])) continue;
       if (std::isfinite(newest.value[i])) {
         repeats = true;
-      } else if (accept(i, time, std::abs(speed_rad_s[i]))) {
-        newest.value[i] = std::abs(speed_rad_s[i]);
+        continue;
       }
+      hear(i, time, speed_rad_s[i]);
+      if (accept(i, time, std::abs(speed_rad_s[i]))) newest.value[i] = std::abs(speed_rad_s[i]);
     }
     if (repeats) refuse();
   }
@@ -238,11 +317,18 @@ class RotorSpeedPredictor {
     return std::isfinite(value) ? value : report_[i].last;
   }
 
-  void restart(TimePoint time, bool by_commands) noexcept {
-    by_commands_ = by_commands;
-    started_ = true;
-    now_ = time;
+  void restart(TimePoint time, SpeedSource source) noexcept {
+    const bool goes_on = source_ != SpeedSource::kNone && time - now_ <= kLongestStep;
+    source_ = source;
     history_.size = history_.next = 0;
+    if (source == SpeedSource::kCommands) {
+      const TimePoint middle = time - params_.command_latency;
+      for (std::size_t i = 0; i < params_.rotor_count && !goes_on; ++i)
+        speed_[i] = scale_[i] * commands_.at(i, middle);
+      if (!goes_on) now_ = time;
+      return;
+    }
+    now_ = time;
     corrected_until_.fill(speeds_.newest().time);
     for (std::size_t i = 0; i < params_.rotor_count; ++i) speed_[i] = reported(i, time);
   }
@@ -283,8 +369,9 @@ class RotorSpeedPredictor {
   std::array<Scalar, kMost> scale_{};
   TimePoint now_{};
   std::array<TimePoint, kMost> corrected_until_{};
-  bool started_ = false;
-  bool by_commands_ = false;
+  SpeedSource source_ = SpeedSource::kNone;
+  std::array<Scalar, kMost> change_{};  ///< D of (6), (rad/s)²/s
+  Scalar command_interval_s_ = 0;
   std::int64_t refused_ = 0;
   std::int64_t refused_speeds_ = 0;
 };

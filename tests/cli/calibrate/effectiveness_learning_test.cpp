@@ -122,9 +122,15 @@ TEST(EffectivenessLearning, RefusesTooLittleFlightAndMissingSpeeds) {
   EffectivenessRecording mute = flown.recording;
   mute.log = "mute.lcm";
   mute.speeds.clear();
+  const auto mixed = learn_effectiveness({flown.recording, mute}, config);
+  ASSERT_FALSE(mixed.has_value());
+  EXPECT_EQ(
+      mixed.error().text,
+      "mute.lcm: no rotor speeds (ESC_STATUS), but other flights have them; learn from flights of one kind");
+  mute.commands.clear();
   const auto without = learn_effectiveness({mute}, config);
   ASSERT_FALSE(without.has_value());
-  EXPECT_EQ(without.error().text, "mute.lcm: no rotor speeds (ESC_STATUS)");
+  EXPECT_EQ(without.error().text, "mute.lcm: neither rotor speeds (ESC_STATUS) nor commands (ROTOR_COMMAND)");
   flown.recording.in_flight.resize(1000);
   const auto brief = learn_effectiveness({flown.recording}, config);
   ASSERT_FALSE(brief.has_value());

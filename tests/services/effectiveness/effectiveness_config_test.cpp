@@ -71,6 +71,7 @@ TEST_F(EffectivenessConfigTest, TheShippedFileSaysWhatIsTheDefault) {
   EXPECT_EQ(config->monitor.false_alarms_per_hour, defaults.false_alarms_per_hour);
   EXPECT_EQ(config->monitor.settle_partial, defaults.settle_partial);
   EXPECT_FALSE(config->monitor.mapping_is_known);
+  EXPECT_EQ(config->monitor.learns_inertial_delay, defaults.learns_inertial_delay);
 }
 
 TEST_F(EffectivenessConfigTest, EveryProblemIsReportedAtOnce) {

@@ -143,9 +143,59 @@ TEST(EffectivenessMonitor, IsMutedWithAReason) {
   EXPECT_FALSE(hover.event);
 
   Hover slow;
-  slow.step_s = 0.01;
+  slow.step_s = 0.025;
   slow.fly(5.0);
   EXPECT_EQ(slow.monitor.muted(), Muted::kTooSlow);
+}
+
+// The body turns faster within a step than it is measured: what counts is that the model follows.
+TEST(EffectivenessMonitor, FindsALossInSeldomSamples) {
+  for (const double step_s : {0.01, 0.015, 0.019}) {
+    Hover hover;
+    hover.step_s = step_s;
+    hover.fly(8.0);
+    ASSERT_FALSE(hover.event);
+    ASSERT_EQ(hover.monitor.muted(), Muted::kNot) << step_s;
+    hover.effectiveness[3] = 0.0;
+    const TimePoint onset = hover.now();
+    hover.fly(0.5);
+    ASSERT_TRUE(hover.event) << step_s;
+    EXPECT_EQ(hover.event->rotor, 3U);
+    EXPECT_LT(hover.event->decided - onset, Duration{60'000}) << step_s;
+  }
+}
+
+TEST(EffectivenessMonitor, RotorsThatHardlyLiftAreNotJudged) {
+  Hover hover;
+  hover.fly(5.0);
+  double judged_s = hover.monitor.judged_s();
+  const double time_s = to_seconds(hover.now().time_since_epoch());
+  for (int i = 1; i <= 100; ++i) {
+    const TimePoint time = from_us(std::llround((time_s + i * kStep_s) * 1e6));
+    static_cast<void>(hover.monitor.on_speeds(time, std::array{110.0 + 0.1 * (i % 3), 110.0, 110.0, 110.0}));
+    EXPECT_FALSE(hover.monitor.on_imu(time, {0.0, 0.0, -0.3}, {}, Phase::kInFlight));
+  }
+  EXPECT_EQ(hover.monitor.muted(), Muted::kNoThrust);
+  EXPECT_LT(hover.monitor.judged_s() - judged_s, 0.1);
+}
+
+TEST(EffectivenessMonitor, ShowsWhatBecameOfEverySample) {
+  Hover hover;
+  struct Seen {
+    double judged_s = 0.0;
+    double muted_s = 0.0;
+  } seen;
+  hover.monitor.observe_judgement(
+      [](void* context, const EffectivenessMonitor::Judgement& judgement) {
+        auto& sums = *static_cast<Seen*>(context);
+        (judgement.muted == Muted::kNot ? sums.judged_s : sums.muted_s) +=
+            to_seconds(judgement.time - judgement.from);
+      },
+      &seen);
+  hover.fly(3.0);
+  EXPECT_NEAR(seen.judged_s, hover.monitor.judged_s(), 0.01);
+  EXPECT_NEAR(seen.judged_s + seen.muted_s, 3.0, 0.01);
+  EXPECT_NEAR(seen.muted_s, 0.5, 0.01) << "settling";
 }
 
 TEST(EffectivenessMonitor, ABlowIsNoLoss) {

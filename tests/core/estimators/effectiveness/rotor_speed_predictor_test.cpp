@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 
 #include "tests/support/allocation_guard.h"
 
@@ -142,6 +144,73 @@ TEST(RotorSpeedPredictor, NoticesFrozenAndImplausibleTelemetry) {
   EXPECT_EQ(predictor.telemetry(0, at(1.2)), Telemetry::kFrozen);
   EXPECT_EQ(predictor.telemetry(1, at(1.2)), Telemetry::kGood);
   EXPECT_EQ(predictor.telemetry(2, at(1.2)), Telemetry::kImplausible);
+}
+
+TEST(RotorSpeedPredictor, WithoutReportsFollowsTheCommandsThroughTheLag) {
+  Predictor predictor{params()};
+  EXPECT_FALSE(predictor.advance(at(0.0)));
+  double worst = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    const double t = 0.002 * i;
+    // A motor answers 4 ms after the stamp.
+    const double ratio = 0.5 + 0.2 * std::sin(15.0 * t);
+    predictor.on_command(at(t), std::array{ratio, 0.5, 0.3});
+    ASSERT_TRUE(predictor.advance(at(t)));
+    if (i > 500) worst = std::max(worst, std::abs(predictor.speed(0) - lagged(t - 0.004, 15.0)));
+  }
+  EXPECT_EQ(predictor.source(), SpeedSource::kCommands);
+  EXPECT_LT(worst, 1.0);
+  EXPECT_NEAR(predictor.speed(2), 400.0, 1e-6);
+  EXPECT_EQ(predictor.gap_sigma(1), 0.0) << "a command that never changes is known between its messages";
+  EXPECT_FALSE(predictor.advance(at(4.3))) << "commands of 0.3 s ago say nothing any more";
+}
+
+TEST(RotorSpeedPredictor, GapsBetweenCommandsAreAsUncertainAsTheyWander) {
+  Predictor predictor{params()};
+  std::mt19937 random{5};
+  std::normal_distribution<double> normal;
+  // A random walk of 100 rad/s per square root of a second, told ten times a second.
+  double ratio = 0.5;
+  double squares = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    predictor.on_command(at(0.1 * i), std::array{ratio, 0.5, 0.5});
+    ASSERT_TRUE(predictor.advance(at(0.1 * i)));
+    if (i >= 1000) squares += predictor.gap_sigma(0) * predictor.gap_sigma(0);
+    ratio = std::clamp(ratio + 0.1 * std::sqrt(0.1) * normal(random), 0.3, 0.7);
+  }
+  // Less at the limits of the walk.
+  EXPECT_NEAR(std::sqrt(squares / 2000.0), 100.0 * std::sqrt(0.1 / 6.0), 3.0);
+  static_cast<void>(predictor.advance(at(299.9 + 0.05)));
+  const double held = predictor.gap_sigma(0);
+  EXPECT_GT(held, 0.0);
+}
+
+TEST(RotorSpeedPredictor, ReportsThatStopLeaveTheCommands) {
+  Predictor predictor{params()};
+  const auto fly = [&predictor](double from_s, double until_s, auto speeds_at) {
+    for (int i = static_cast<int>(from_s * 100.0); i < static_cast<int>(until_s * 100.0); ++i) {
+      predictor.on_command(at(0.01 * i), std::array{0.5, 0.5, 0.5});
+      speeds_at(0.01 * i);
+      static_cast<void>(predictor.advance(at(0.01 * i)));
+    }
+  };
+  const double nan = std::nan("");
+  fly(0.0, 4.0, [&](double t) { predictor.on_speed(at(t), std::array{540.0 + std::sin(t), 600.0, 630.0}); });
+  EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
+  EXPECT_FALSE(predictor.is_overdue(0, at(4.0)));
+  EXPECT_TRUE(predictor.is_overdue(0, at(4.02)));
+  // One that is silent while others report is missing: its motor may stand.
+  fly(4.0, 5.0, [&](double t) { predictor.on_speed(at(t), std::array{nan, 600.0 + std::sin(t), 630.0}); });
+  EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
+  EXPECT_EQ(predictor.telemetry(0, at(5.0)), Telemetry::kMissing);
+  // What is refused is still heard: no reason to go on without it.
+  fly(5.0, 6.0, [&](double t) { predictor.on_speed(at(t), std::array{nan, 9000.0, 9000.0}); });
+  EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
+  fly(6.0, 7.0, [](double) {});
+  EXPECT_EQ(predictor.source(), SpeedSource::kCommands);
+  EXPECT_NEAR(predictor.speed(2), 630.0, 3.0) << "with the scale that the reports had taught";
+  fly(7.0, 8.0, [&](double t) { predictor.on_speed(at(t), std::array{540.0, 600.0 + std::sin(t), 630.0}); });
+  EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
 }
 
 TEST(RotorSpeedPredictor, UsesNoHeap) {
