@@ -14,6 +14,8 @@ constexpr double kLongestStep_s = 0.03;  // a longer gap interrupts
 constexpr double kLook_s = 1.0;
 constexpr Duration kDoubtful{
     1'000'000};  // after a speed that was refused: where one is wrong, others are too
+constexpr double kMostRate_rad_s =
+    3.0;  // where the body tumbles, inertia and air that nobody described decide
 constexpr double kMostTelemetryInterval_s = 0.025;  // between two, speeds are taken as straight lines
 
 double hover_speed2(const EffectivenessMatrix<double>& matrix) {
@@ -112,6 +114,9 @@ std::optional<SlowEvidence::Excess> SlowEvidence::process(const SlowSample& samp
   const double dt_s = last_ ? to_seconds(sample.time - *last_) : 0.0;
   last_ = sample.time;
   const bool goes_on = is_running_ && !starts_over_ && dt_s <= kLongestStep_s;
+  const auto& w = sample.gyro_rad_s;
+  if (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] > kMostRate_rad_s * kMostRate_rad_s)
+    doubtful_until_ = sample.time + kDoubtful;
   const bool is_doubtful = doubtful_until_ && sample.time < *doubtful_until_;
   is_running_ = sample.is_judged && !is_doubtful && telemetry_interval_s_ <= kMostTelemetryInterval_s;
   if (!is_running_) return std::nullopt;
@@ -176,7 +181,11 @@ void SlowEvidence::step(const SlowSample& sample, double dt_s) noexcept {
     seen.lift_m_s2 += B[kVerticalRow][i] * now;
   }
   thrust_.step(seen);
-  spin_.step(dt_s, speeds_.speeds(), std::span{before_}.first(n_), w[2], gyroscopic[2]);
+  std::array<double, 2> tilting{};
+  for (std::size_t i = 0; i < n_; ++i) {
+    for (std::size_t axis = 0; axis < 2; ++axis) tilting[axis] += seen.contribution[i][axis];
+  }
+  spin_.step(dt_s, speeds_.speeds(), std::span{before_}.first(n_), w[2], tilting, gyroscopic[2]);
 }
 
 SlowEvidence::Excess SlowEvidence::excess_of(std::size_t rotor, const SlowSample& sample) const noexcept {

@@ -29,19 +29,23 @@ struct SpinRegressionParams {
   Scalar least_gain = Scalar(0.3);      ///< neither can have the other sign
   Scalar tilt_rad = Scalar(0.03);       ///< of one rotor's axis: its thrust then turns the body too
   Scalar inertia_spread = Scalar(0.1);  ///< of one rotor's inertia against the others
-  Scalar offset = 1;                    ///< steady moment, in the same shares
+  Scalar coupling =
+      Scalar(0.1);    ///< of roll and pitch into yaw: axes of the inertial unit, products of inertia
+  Scalar offset = 1;  ///< steady moment, in the same shares
 };
 
 /// Which way the rotors turn, from how the body yaws, over minutes of flight.
 ///   Torque      of rotor j, turning as described (s = +1 clockwise):  dⱼ = −s·κ_m·κ·ω²/I_z (drag),
 ///               rⱼ = −s·J·ω̇/I_z (reaction to its acceleration)                                         (1)
-///   Model       ṙ = Σ σⱼ·(g_d·dⱼ + g_r·rⱼ) + εⱼ·dⱼ + ηⱼ·rⱼ + o + disturbance,  σⱼ = −1: turns the other way    (2)
-///               g ~ N(1, gain²), at least least_gain; ε ~ N(0, (tilt·armⱼ/κ_m)²); η ~ N(0, spread²); o ~ N(0, offset²)
-///   Sums        traces of dⱼ, rⱼ and o in the innovations of a RateAxis without input, by InformationSums       (3)
-///   Nuisance    M ← M − M·(M + Λ)⁻¹·M, c ← c − M·(M + Λ)⁻¹·c, with Λ the inverse variances of ε, η, o            (4)
+///   Model       ṙ = Σ σⱼ·(g_d·dⱼ + g_r·rⱼ) + εⱼ·dⱼ + ηⱼ·rⱼ + m_p·ṗ + m_q·q̇ + o + disturbance,                 (2)
+///               σⱼ = −1: turns the other way; ṗ, q̇ as the rotors give them
+///               g ~ N(1, gain²), at least least_gain; ε ~ N(0, (tilt·armⱼ/κ_m)²); η ~ N(0, spread²); m ~ N(0, coupling²);
+///               o ~ N(0, offset²)
+///   Sums        traces of dⱼ, rⱼ, ṗ, q̇ and o in the innovations of a RateAxis without input, by InformationSums       (3)
+///   Nuisance    M ← M − M·(M + Λ)⁻¹·M, c ← c − M·(M + Λ)⁻¹·c, with Λ the inverse variances of ε, η, m, o           (4)
 ///   Pattern     ℓ(σ) = max over g of cᵀθ − ½·θᵀMθ − ½·|g − 1|²/gain²,  θ = (σ·g_d, σ·g_r)                     (5)
 ///   Source      (1) as in a rigid body with rotors; derived in docs/equations/effectiveness.md
-/// Cost of a sample: (2N + 1)·(2N + 10) flops; of all 2^N patterns 8·N²·2^N. No heap.
+/// Cost of a sample: (2N + 3)·(2N + 12) flops; of all 2^N patterns 8·N²·2^N. No heap.
 template <class Scalar, std::size_t kMost = kMaxRotors>
 class SpinRegression {
  public:
@@ -87,9 +91,10 @@ class SpinRegression {
     for (auto& trace : traces_) trace.rate = Scalar{0};
   }
 
-  /// Speeds at the sample and at the one before, rad/s; `gyroscopic` what the turning body adds to ṙ.
+  /// Speeds at the sample and at the one before, rad/s; ṗ and q̇ that the rotors give; `gyroscopic` what the turning
+  /// body adds to ṙ.
   void step(Scalar dt_s, std::span<const Scalar> speed, std::span<const Scalar> before, Scalar rate_rad_s,
-            Scalar gyroscopic_rad_s2) noexcept {
+            const std::array<Scalar, 2>& tilting_rad_s2, Scalar gyroscopic_rad_s2) noexcept {
     if (!is_described_) return;
     const Scalar white = params_.acceleration_ratio * authority_;
     const Scalar wander = params_.disturbance_ratio_per_sqrt_s * authority_;
@@ -103,17 +108,19 @@ class SpinRegression {
       h[i] = traces_[i].step(seen, drag_per_speed2_[i] * speed2);  // (1), (3)
       h[n_ + i] = traces_[n_ + i].step(seen, inertia_ratio_[i] * (speed[i] - before[i]) / dt_s);
     }
-    h[2 * n_] = traces_[2 * n_].step(seen, authority_);
-    sums_.add(h, 2 * n_ + 1, seen.innovation, seen.variance);
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      h[2 * n_ + axis] = traces_[2 * n_ + axis].step(seen, tilting_rad_s2[axis]);
+    h[2 * n_ + 2] = traces_[2 * n_ + 2].step(seen, authority_);
+    sums_.add(h, 2 * n_ + 3, seen.innovation, seen.variance);
   }
 
-  void fade(Scalar keep) noexcept { sums_.fade(keep, 2 * n_ + 1); }
+  void fade(Scalar keep) noexcept { sums_.fade(keep, 2 * n_ + 3); }
 
   /// (5) over all patterns; nothing where the sums are not finite.
   [[nodiscard]] std::optional<Verdict> judge() const noexcept;
 
  private:
-  static constexpr std::size_t kParameters = 2 * kMost + 1;
+  static constexpr std::size_t kParameters = 2 * kMost + 3;
   static constexpr int kSize = static_cast<int>(kParameters);
   static constexpr Scalar kVarianceTime_s = 2;
   static constexpr Scalar kLeastVarianceRatio = Scalar(0.01);
@@ -124,7 +131,7 @@ class SpinRegression {
 
   [[nodiscard]] bool marginal(Matrix& m, Vector& c) const noexcept {  // (4)
     const auto n = static_cast<Eigen::Index>(n_);
-    const Eigen::Index size = 2 * n + 1;
+    const Eigen::Index size = 2 * n + 3;
     m.resize(size, size);
     c.resize(size);
     for (Eigen::Index i = 0; i < size; ++i) {
@@ -135,7 +142,8 @@ class SpinRegression {
     Matrix with_prior = m;
     for (Eigen::Index i = 0; i < size; ++i) {
       const Scalar sigma = i < n          ? tilt_[static_cast<std::size_t>(i)]
-                           : i < size - 1 ? params_.inertia_spread
+                           : i < 2 * n    ? params_.inertia_spread
+                           : i < size - 1 ? params_.coupling
                                           : params_.offset;
       with_prior(i, i) += Scalar{1} / std::max(sigma * sigma, Scalar(1e-6));
     }

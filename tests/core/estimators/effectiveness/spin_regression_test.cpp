@@ -58,7 +58,7 @@ SpinRegression<Scalar> flown(const Multirotor& described, std::uint32_t pattern,
     }
     rate += kStep_s * torque / inertia;
     regression.step(Scalar(kStep_s), std::span{now}.first(n), std::span{before}.first(n),
-                    static_cast<Scalar>(rate + 0.02 * normal(random)), Scalar{0});
+                    static_cast<Scalar>(rate + 0.02 * normal(random)), {}, Scalar{0});
   }
   return regression;
 }
