@@ -285,6 +285,9 @@ void Simulation::drive_motors(const ControlOutput& control) {
         case FaultKind::kPartialLoss:
           rotor.thrust_ratio *= 1.0 - std::clamp(fault.magnitude_at(time_s_), 0.0, 1.0);
           break;
+        case FaultKind::kOverEffective:
+          rotor.thrust_ratio *= 1.0 + fault.magnitude;
+          break;
         case FaultKind::kStuckCommand:
           if (!is_stuck_[place]) stuck_command_[place] = ratio;
           is_stuck_[place] = true;

@@ -8,6 +8,10 @@ PROGRAMS = ROOT / "build/dev/bin"
 LOST = ("lost", 0, 1200)
 LOSSES = ("0.1", "0.2", "0.3", "0.4", "0.6")
 PARTIAL_FLIGHTS = 40
+EXCESSES = ("0.2", "0.3", "0.5")
+EXCESS_FLIGHTS = 48
+MOUNTED, SUDDEN = ("0", "120"), ("10", "1")  # onset and how long it is waited for, s
+SPINS = (0, 96, 80)
 HEALTHY = {"flights": ("healthy", 0, 310, 2, 60), "landings": ("healthy", 5000, 24, 20, 10)}
 
 
@@ -92,6 +96,49 @@ def partial_lines():
     return lines
 
 
+def excess_table(kind, onset, unit, scale):
+    """How often a rotor that gives too much is found, and what it is read to give; delays times `scale`."""
+    lines = [f"| excess | flights | found | median {unit} | 95 % | most | wrong rotor or kind | k read, mean ± deviation | k true |",
+             "|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]
+    by_vehicle = collections.defaultdict(dict)
+    for excess in EXCESSES:
+        rows = flown(f"over_{kind}_{excess}", ("over", 0, EXCESS_FLIGHTS, excess, *onset))
+        said = [row for row in rows if row[5] != "-"]
+        right = [row for row in said if row[5] == row[3] and row[8] == "over_effective"]
+        for row in rows:
+            found, flights = by_vehicle[row[1]].get(excess, (0, 0))
+            by_vehicle[row[1]][excess] = (found + (row in right), flights + 1)
+        if not right:
+            lines.append(f"| {excess} | {len(rows)} | 0 | – | – | – | {len(said)} | – | {1 + float(excess):.1f} |")
+            continue
+        times, read = [scale * float(row[6]) for row in right], [float(row[7]) for row in right]
+        centre = sum(read) / len(read)
+        spread = (sum((k - centre) ** 2 for k in read) / len(read)) ** 0.5
+        lines.append(f"| {excess} | {len(rows)} | {len(right)} | {quantile(times, .5):.0f} | {quantile(times, .95):.0f} | "
+                     f"{max(times):.0f} | {len(said) - len(right)} | {centre:.2f} ± {spread:.2f} | {1 + float(excess):.1f} |")
+    lines += ["", f"| found of flights | {' | '.join(EXCESSES)} |", f"|---|{'--:|' * len(EXCESSES)}"]
+    return lines + [f"| {name} | " + " | ".join("{} of {}".format(*counts[excess]) for excess in EXCESSES) + " |"
+                    for name, counts in by_vehicle.items()]
+
+
+def spin_lines():
+    lines = ["| vehicle file | flights | named | not named | not noticed | wrongly named | rotors blamed | median s | most |",
+             "|---|--:|--:|--:|--:|--:|--:|--:|--:|"]
+    groups = collections.defaultdict(list)
+    for row in flown("spin", ("spin", *SPINS)):
+        wrong = int(row[3], 16).bit_count()
+        groups[{0: "right", 1: "one rotor", 2: "two neighbours exchanged"}.get(wrong, "all rotors")].append(row)
+    for name, rows in groups.items():
+        noticed = [row for row in rows if row[4] != "0"]
+        named = [row for row in noticed if row[5] == "1"]
+        right = sum(row[3] == row[4] for row in named)
+        times = [float(row[6]) for row in noticed]
+        seconds = f"{quantile(times, .5):.0f} | {max(times):.0f}" if times else "– | –"
+        lines.append(f"| {name} | {len(rows)} | {right} | {len(noticed) - len(named)} | {len(rows) - len(noticed)} | "
+                     f"{len(named) - right} | {sum(row[8] != '0' for row in rows)} | {seconds} |")
+    return lines
+
+
 def healthy_lines():
     lines = ["| flights | off the ground | judged | take-offs | false alarms, ours | published filter |",
              "|---|--:|--:|--:|--:|--:|"]
@@ -102,7 +149,7 @@ def healthy_lines():
         lines.append(f"| {name}: {len(rows)} of {arguments[3]} × {arguments[4]} s | {total[0] / 3600:.2f} h | "
                      f"{total[1] / 3600:.2f} h | {total[2]:.0f} | {total[3]:.0f} | {total[4]:.0f} |")
         found += [" ".join(row) for row in rows if len(row) > 8]
-    return lines + (["", "Every alarm (rotor @ s):", ""] + [f"- {line}" for line in found] if found else [])
+    return lines + (["", "Every alarm (rotor @ s; spin: rotors said to turn the other way):", ""] + [f"- {line}" for line in found] if found else [])
 
 
 def effectiveness(_):
@@ -122,5 +169,13 @@ def effectiveness(_):
         "## A part of the thrust is lost", "",
         "Clairvoyant: a cumulative sum that knows rotor and size, on the same innovations, its threshold for the same rate of",
         "false alarms; on the flights that ours found.", "", *partial_lines(), "",
+        "## A rotor gives too much thrust", "",
+        "A wrong propeller, mounted on the ground; times since lift-off. Two minutes are waited for.", "",
+        *excess_table("mounted", MOUNTED, "s", 1), "",
+        "The same beginning in flight, which no propeller does: 1 s is waited for. What is called wrong is a partial loss of the",
+        "opposite rotor, which has the same moments and differs in the lift alone.", "",
+        *excess_table("sudden", SUDDEN, "ms", 1000), "",
+        "## A vehicle file with a wrong sense of rotation", "",
+        f"Healthy flights of {SPINS[2]} s, times since lift-off.", "", *spin_lines(), "",
         "## Healthy flights", "", *healthy_lines(), "",
         "Recorded flights: [evidence_effectiveness_recorded.md](evidence_effectiveness_recorded.md)."])

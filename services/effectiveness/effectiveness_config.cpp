@@ -42,6 +42,9 @@ void read_policy(ConfigTable table, EffectivenessParams& params) {
   params.false_alarms_per_hour = table.required<double>("false_alarms_per_hour", Range{1e-12, 1.0});
   params.least_loss_ratio =
       table.optional<double>("least_loss_ratio", params.least_loss_ratio, Range{0.05, 0.5});
+  params.propeller_spread_ratio =
+      table.optional<double>("propeller_spread_ratio", params.propeller_spread_ratio, Range{0.005, 0.3});
+  params.offset_ratio = table.optional<double>("offset_ratio", params.offset_ratio, Range{0.001, 0.5});
   params.lost_below_ratio =
       table.optional<double>("lost_below_ratio", params.lost_below_ratio, Range{0.05, 0.5});
   params.lost_probability =

@@ -15,8 +15,9 @@ using Transition = FaultLifeCycle::Transition;
 
 constexpr double kRadPerS_per_rpm = std::numbers::pi / 30.0;
 constexpr Duration kInertialTimeout{200'000};
-constexpr double kPullRatio = 0.005;   // of the filter for the status: half a second back to 1 unseen
-constexpr double kYawVariance = 25.0;  // yaw also answers to rotors that speed up, which the row leaves out
+constexpr double kPullRatio = 0.005;  // of the filter for the status: half a second back to 1 unseen
+constexpr std::size_t kKinds = 3;     // slots of faults for each rotor
+constexpr std::size_t kDescriptionSlot = kKinds * kMaxRotors;
 
 std::string_view name_of(SpeedSource source) {
   switch (source) {
@@ -36,8 +37,8 @@ std::string rotor_name(std::size_t index) { return fmt::format("rotor {}", index
 
 LossOfEffectivenessParams<double> filter_params(const EffectivenessParams& monitor) {
   LossOfEffectivenessParams<double> params;
+  // Without the yaw row: the sense of rotation may be described wrongly.
   params.pull_ratio = kPullRatio;
-  params.measurement_variance[kYawRow] = kYawVariance;
   params.lost_below = monitor.lost_below_ratio;
   return params;
 }
@@ -76,13 +77,90 @@ std::string text_of(Muted muted, Phase phase, std::size_t rotor) {
 std::vector<evidence_t> evidence_of(const LossEvent& event, const EffectivenessMonitor& monitor) {
   using rt::evidence;
   return {evidence("log_likelihood_ratio", event.evidence, "nat"),
-          evidence("threshold", monitor.test().threshold(), "nat"),
+          evidence("threshold", event.threshold, "nat"),
           evidence("second_rotor", event.second, "nat"),
           evidence("unexplained", event.unexplained, "nat"),
           evidence("speed_over_commanded", monitor.speeds().scale(event.rotor), "1"),
           evidence("speed_from_commands_alone",
                    monitor.speeds().source() == SpeedSource::kCommands ? 1.0 : 0.0, "1"),
           evidence("sample_age", to_seconds(event.decided - event.sample), "s")};
+}
+
+std::string_view name_of(LossKind kind) {
+  switch (kind) {
+    case LossKind::kPropellerLost:
+      return "propeller_lost";
+    case LossKind::kPartialLoss:
+      return "partial_loss";
+    case LossKind::kOverEffective:
+      break;
+  }
+  return "over_effective";
+}
+
+std::string summary_of(const LossEvent& event) {
+  if (event.kind == LossKind::kOverEffective)
+    return fmt::format("{:.0f} % of the thrust described: is it the right propeller?",
+                       100.0 * event.effectiveness);
+  return fmt::format("{:.0f} % of its thrust left", 100.0 * std::max(0.0, event.effectiveness));
+}
+
+/// "rotors 1 and 3", "rotor 2".
+std::string rotors_of(std::uint32_t pattern) {
+  std::vector<std::size_t> rotors;
+  for (std::size_t i = 0; i < kMaxRotors; ++i) {
+    if ((pattern >> i) & 1U) rotors.push_back(i + 1);
+  }
+  std::string text = rotors.size() == 1 ? "rotor " : "rotors ";
+  for (std::size_t i = 0; i < rotors.size(); ++i) {
+    text += fmt::format("{}{}", i == 0 ? "" : i + 1 == rotors.size() ? " and " : ", ", rotors[i]);
+  }
+  return text;
+}
+
+std::string describe_spin(std::uint32_t pattern, bool is_named, const Multirotor& vehicle) {
+  if (!is_named) return "the vehicle yaws as if some rotors turned the other way than the vehicle file says";
+  if (pattern == (1U << vehicle.rotor_count) - 1)
+    return "all rotors seem to turn the other way than the vehicle file says";
+  std::array<std::uint32_t, 2> described{};  // clockwise, counter-clockwise
+  for (std::size_t i = 0; i < vehicle.rotor_count; ++i) {
+    if ((pattern >> i) & 1U) described[vehicle.rotor[i].spin > 0 ? 0 : 1] |= 1U << i;
+  }
+  constexpr std::array<std::string_view, 2> kWays{"clockwise", "counter-clockwise"};
+  std::string text;
+  for (std::size_t way = 0; way < 2; ++way) {
+    if (described[way] == 0) continue;
+    const bool is_one = (described[way] & (described[way] - 1)) == 0;
+    text += fmt::format("{}{} {} to turn {}, the vehicle file says {}", text.empty() ? "" : "; ",
+                        rotors_of(described[way]), is_one ? "seems" : "seem", kWays[1 - way], kWays[way]);
+  }
+  return text;
+}
+
+std::string describe_numbering(const RotorMapping<double>::Verdict& verdict, std::size_t n) {
+  if (verdict.roll_sign < 0.0 || verdict.pitch_sign < 0.0) {
+    const char* axis = verdict.roll_sign > 0.0 ? "the pitch axis" : "the roll axis";
+    return fmt::format("the vehicle moves as if {} pointed the other way than described",
+                       verdict.roll_sign < 0.0 && verdict.pitch_sign < 0.0 ? "roll and pitch axis" : axis);
+  }
+  std::uint32_t moved = 0;
+  std::string order;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (verdict.order[i] != i) moved |= 1U << i;
+    order += fmt::format("{}{}", order.empty() ? "" : ", ", verdict.order[i] + 1);
+  }
+  const std::string text = rotors_of(moved);
+  const bool is_swap = text.find(',') == std::string::npos;
+  return is_swap ? fmt::format("{} seem to be swapped in the vehicle file", text)
+                 : fmt::format("the rotors seem to be numbered as {} of the vehicle file", order);
+}
+
+/// What of the vehicle file looks wrong; empty if nothing does.
+std::string describe_implausible(const EffectivenessMonitor& monitor, const Multirotor& vehicle) {
+  if (monitor.mapping() == Mapping::kWrongNumbers)
+    return describe_numbering(monitor.numbering(), vehicle.rotor_count);
+  const auto spin = monitor.wrong_spin();
+  return spin ? describe_spin(*spin, monitor.slow().is_spin_named(), vehicle) : "";
 }
 
 }  // namespace
@@ -116,6 +194,7 @@ void EffectivenessService::on_imu(const imu_t& message) {
   const std::array gyro{message.gyro_rad_s[0], message.gyro_rad_s[1], message.gyro_rad_s[2]};
   handle(monitor_.on_imu(time, accel, gyro, phase));
   note_source();
+  check_description(time);
   if (phase == Phase::kInFlight) estimate(time, message);
 }
 
@@ -141,29 +220,57 @@ void EffectivenessService::on_rotor_command(const rotor_command_t& message) {
 
 void EffectivenessService::handle(const std::optional<LossEvent>& event) {
   if (!event) return;
-  const bool is_lost = event->kind == LossKind::kPropellerLost;
+  const bool is_over_effective = event->kind == LossKind::kOverEffective;
   rt::Fault fault;
   fault.component = rotor_name(event->rotor);
-  fault.fault_kind = is_lost ? "propeller_lost" : "partial_loss";
-  fault.severity = is_lost ? rt::Severity::kWarning : rt::Severity::kCaution;
-  fault.latched = true;
-  fault.probability = event->probability_lost;
+  fault.fault_kind = name_of(event->kind);
+  fault.severity = event->kind == LossKind::kPropellerLost ? rt::Severity::kWarning : rt::Severity::kCaution;
+  fault.latched = !is_over_effective;
+  fault.probability = event->probability;
   fault.magnitude = event->effectiveness;
   fault.magnitude_sigma = event->sigma;
   fault.magnitude_unit = "1";
   fault.onset = event->onset;
-  fault.summary = fmt::format("{:.0f} % of its thrust left", 100.0 * std::max(0.0, event->effectiveness));
+  fault.summary = summary_of(*event);
   fault.evidence = evidence_of(*event, monitor_);
   // A partial loss that grows is the same fault, until nothing is left.
   std::optional<LossKind>& raised = raised_[event->rotor];
   const bool is_new = raised != event->kind;
-  const std::size_t slot = 2 * event->rotor + (is_lost ? 1 : 0);
-  reporter_.report(slot, is_new ? Transition::kRaise : Transition::kUpdate, event->decided, fault);
-  raised = event->kind;
+  const Transition transition = event->is_over ? Transition::kClear
+                                : is_new       ? Transition::kRaise
+                                               : Transition::kUpdate;
+  reporter_.report(kKinds * event->rotor + static_cast<std::size_t>(event->kind), transition, event->decided,
+                   fault);
+  raised = event->is_over ? std::nullopt : std::optional{event->kind};
+}
+
+void EffectivenessService::check_description(TimePoint now) {
+  const bool is_spin = monitor_.mapping() != Mapping::kWrongNumbers;
+  const Description seen{!is_spin, monitor_.wrong_spin().value_or(0), monitor_.slow().is_spin_named()};
+  if (seen == described_) return;
+  described_ = seen;
+  std::string wrong = describe_implausible(monitor_, config_.monitor.vehicle);
+  if (wrong.empty()) return;
+  rt::Fault fault;
+  fault.component = "vehicle file";
+  fault.fault_kind = "implausible_configuration";
+  fault.severity = rt::Severity::kAdvisory;
+  fault.latched = true;
+  fault.onset = now;
+  fault.summary = wrong;
+  if (is_spin) {
+    fault.evidence = {rt::evidence("log_likelihood_ratio", monitor_.slow().spin_evidence(), "nat"),
+                      rt::evidence("threshold", monitor_.slow().spin_threshold(), "nat")};
+  }
+  reporter_.report(kDescriptionSlot, implausible_.empty() ? Transition::kRaise : Transition::kUpdate, now,
+                   fault);
+  implausible_ = std::move(wrong);
 }
 
 std::string EffectivenessService::muted_reason() const {
   if (last_imu_ && tick_ - *last_imu_ > kInertialTimeout) return "inertial data stale";
+  if (monitor_.muted() == Muted::kRotorMapping && !implausible_.empty())
+    return "vehicle file implausible: " + implausible_;
   return text_of(monitor_.muted(), phase_.phase().phase(), rotor_in_question());
 }
 
@@ -215,7 +322,8 @@ rt::DetectorReport EffectivenessService::report() {
                       "1"),
          rt::evidence("effectiveness_found", monitor_.effectiveness(i), "1"),
          rt::evidence("inertial_delay", to_seconds(monitor_.inertial_delay()), "s"),
-         rt::evidence("speed_from_commands_alone", uses_commands_alone() ? 1.0 : 0.0, "1")}));
+         rt::evidence("speed_from_commands_alone", uses_commands_alone() ? 1.0 : 0.0, "1"),
+         rt::evidence("effectiveness_since_take_off", monitor_.slow().effectiveness(i), "1")}));
   }
   node_.counters()["samples_refused"] = monitor_.times_gone_back() + monitor_.samples_dropped();
   node_.counters()["speeds_refused"] = monitor_.speeds().refused_speeds();

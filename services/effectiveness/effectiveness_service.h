@@ -32,11 +32,22 @@ class EffectivenessService {
   void observe_judgement(JudgementObserver observer);
 
  private:
+  /// What the monitor says of the vehicle file; all as at first: it may be right.
+  struct Description {
+    bool is_numbered_otherwise = false;
+    std::uint32_t wrong_spin = 0;
+    bool is_spin_named = false;
+
+    bool operator==(const Description&) const = default;
+  };
+
   void on_imu(const imu_t& message);
   void on_esc_status(const esc_status_t& message);
   void on_rotor_command(const rotor_command_t& message);
   void estimate(TimePoint time, const imu_t& message);
   void handle(const std::optional<LossEvent>& event);
+  /// Tells once that the vehicle file describes another vehicle, and what of it looks wrong.
+  void check_description(TimePoint now);
   [[nodiscard]] rt::DetectorReport report();
   void note_source();
   [[nodiscard]] std::string muted_reason() const;
@@ -54,6 +65,8 @@ class EffectivenessService {
   JudgementObserver judgement_observer_;
   SpeedSource logged_source_ = SpeedSource::kNone;
   std::array<std::optional<LossKind>, kMaxRotors> raised_{};
+  Description described_;
+  std::string implausible_;  ///< as last published; empty: the description may be right
   rt::FaultReporter reporter_;
 };
 

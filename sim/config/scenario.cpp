@@ -33,6 +33,7 @@ constexpr std::array kFaults{
     FaultWord{FaultKind::kPropellerLost, "propeller_lost", Subject::kRotor, "", kAny, ""},
     FaultWord{FaultKind::kPartialLoss, "partial_loss", Subject::kRotor, "loss_ratio", kShare,
               "growth_ratio_per_s"},
+    FaultWord{FaultKind::kOverEffective, "over_effective", Subject::kRotor, "excess_ratio", kShare, ""},
     FaultWord{FaultKind::kStuckCommand, "stuck_command", Subject::kRotor, "", kAny, ""},
     FaultWord{FaultKind::kDeadEsc, "dead_esc", Subject::kRotor, "", kAny, ""},
     FaultWord{FaultKind::kDesync, "desync", Subject::kRotor, "", kAny, ""},

@@ -27,6 +27,7 @@ enum class FaultKind {
   kUnbalance,
   kPropellerLost,
   kPartialLoss,
+  kOverEffective,
   kStuckCommand,
   kDeadEsc,
   kDesync,

@@ -234,14 +234,20 @@ EffectivenessOutcome fly(const EffectivenessFlight& flight,
       outcome.muted_in_flight = muted;
     if (simulation.has_contact()) last_contact_s = simulation.time_s();
     const bool grounded = simulation.time_s() - last_contact_s < 0.05;
-    if (on_ground && !grounded) ++outcome.take_offs;
+    if (on_ground && !grounded && outcome.take_offs++ == 0) outcome.lift_off_s = simulation.time_s();
     on_ground = grounded;
     if (!grounded) outcome.flown_s += 1.0 / Controller::kRate_Hz;
-    if (flight.fault && !outcome.ours.empty() && detectors.faithful_done()) break;
+    if (const auto spin = detectors.monitor().wrong_spin(); spin && !outcome.wrong_spin)
+      outcome.wrong_spin_s = simulation.time_s();
+    outcome.wrong_spin = detectors.monitor().wrong_spin();
+    const bool needs_filter = !flight.fault || flight.fault->kind != FaultKind::kOverEffective;
+    if (flight.fault && !outcome.ours.empty() && (detectors.faithful_done() || !needs_filter)) break;
   }
   if (clairvoyant && clairvoyant->found()) outcome.clairvoyant_s = seconds(*clairvoyant->found());
   outcome.muted = detectors.monitor().muted();
   outcome.judged_s = detectors.monitor().judged_s();
+  outcome.is_spin_named = detectors.monitor().slow().is_spin_named();
+  outcome.spin_evidence = detectors.monitor().slow().spin_evidence();
   outcome.unexplained = detectors.monitor().test().unexplained_disturbances();
   return outcome;
 }

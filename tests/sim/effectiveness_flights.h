@@ -51,10 +51,15 @@ struct EffectivenessOutcome {
   std::vector<Said> faithful;
   std::optional<double> clairvoyant_s;  ///< a cumulative sum that knows rotor and size
   double flown_s = 0.0;                 ///< off the ground
+  double lift_off_s = 0.0;              ///< first time off the ground
   double judged_s = 0.0;                ///< of that, not muted
   int take_offs = 0;
   bool was_judging = false;  ///< at the onset
   std::int64_t unexplained = 0;
+  std::optional<std::uint32_t> wrong_spin;  ///< bit i: rotor i seems to turn the other way than described
+  bool is_spin_named = false;
+  double wrong_spin_s = 0.0;                                          ///< when that was known
+  double spin_evidence = 0.0;                                         ///< at the end, nats
   effectiveness::Muted muted = effectiveness::Muted::kNot;            ///< at the end
   effectiveness::Muted muted_in_flight = effectiveness::Muted::kNot;  ///< last reason but the phase's
 };

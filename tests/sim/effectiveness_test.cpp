@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <utility>
 #include <vector>
@@ -93,10 +94,90 @@ TEST(Effectiveness, RotorsNumberedOtherwiseAreNoMotorFault) {
     Multirotor mirrored = flight.vehicle;
     for (Rotor& rotor : mirrored.rotor) rotor.position_m[1] = -rotor.position_m[1];
     EXPECT_EQ(muted_with(mirrored), Muted::kRotorMapping) << name;
-    // The sense of rotation is not used: no fault, and nothing noticed.
-    Multirotor counter = flight.vehicle;
-    for (Rotor& rotor : counter.rotor) rotor.spin = -rotor.spin;
-    EXPECT_EQ(muted_with(counter), Muted::kNot) << name;
+  }
+}
+
+/// A flight with a vehicle file that has the rotors of `pattern` turn the wrong way.
+EffectivenessOutcome fly_described_wrongly(const EffectivenessFlight& flight, std::uint32_t pattern) {
+  Multirotor described = flight.vehicle;
+  for (std::size_t i = 0; i < described.rotor_count; ++i) {
+    if ((pattern >> i) & 1U) described.rotor[i].spin = -described.rotor[i].spin;
+  }
+  return fly(flight, effectiveness_params(described));
+}
+
+TEST(Effectiveness, AWrongSenseOfRotationIsNamedAndNoMotorFault) {
+  for (const char* name : {"unbalance_medium", "unbalance_hexa"}) {
+    EffectivenessFlight flight = flight_of(name, 6, Manoeuvre::kRandom);
+    flight.duration_s = 60.0;
+    const std::size_t n = flight.vehicle.rotor_count;
+    std::vector<std::uint32_t> patterns{(1U << n) - 1, 0b11, 0b110};  // all, and neighbours exchanged
+    for (std::size_t i = 0; i < n; ++i) patterns.push_back(1U << i);
+    for (const std::uint32_t pattern : patterns) {
+      const auto outcome = fly_described_wrongly(flight, pattern);
+      EXPECT_TRUE(outcome.ours.empty()) << name << " " << pattern;
+      EXPECT_EQ(outcome.wrong_spin, pattern) << name;
+      EXPECT_TRUE(outcome.is_spin_named) << name << " " << pattern;
+    }
+  }
+}
+
+TEST(Effectiveness, HealthyVehiclesTurnAsDescribedAndFitTheirPropellers) {
+  for (std::size_t number = 0; number < 5 * kVehicles.size(); ++number) {
+    const char* name = kVehicles[number % kVehicles.size()];
+    constexpr std::array kManoeuvres{Manoeuvre::kHover, Manoeuvre::kCircle, Manoeuvre::kRandom};
+    EffectivenessFlight flight = flight_of(name, 300 + number, kManoeuvres[number % kManoeuvres.size()]);
+    flight.duration_s = 25.0;
+    flight.realism.wind.mean_m_s = 2.0 * static_cast<double>(number % 6);
+    const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+    EXPECT_TRUE(outcome.ours.empty()) << name << " " << number;
+    EXPECT_FALSE(outcome.wrong_spin) << name << " " << number;
+    EXPECT_GT(outcome.judged_s, 10.0) << name << " " << number;
+  }
+}
+
+EffectivenessOutcome fly_with_excess(const char* name, std::uint64_t seed, double excess, double onset_s) {
+  EffectivenessFlight flight = flight_of(name, seed, Manoeuvre::kRandom);
+  flight.fault =
+      Fault{.kind = FaultKind::kOverEffective, .onset_s = onset_s, .rotor = 2, .magnitude = excess};
+  flight.duration_s = 120.0;
+  flight.give_up_s = 100.0;
+  return fly(flight, effectiveness_params(flight.vehicle));
+}
+
+TEST(Effectiveness, FindsAWrongPropellerThatWasMountedOnTheGround) {
+  for (const char* name : {"unbalance_medium", "unbalance_hexa", "bebop2"}) {
+    const auto outcome = fly_with_excess(name, 8, 0.7, 0.0);
+    ASSERT_FALSE(outcome.ours.empty()) << name;
+    const Said& said = outcome.ours.front();
+    EXPECT_EQ(said.rotor, 1U) << name;
+    EXPECT_EQ(said.kind, effectiveness::LossKind::kOverEffective) << name;
+    EXPECT_NEAR(said.effectiveness, 1.7, 0.3) << name;
+    EXPECT_GT(said.event.probability, 0.99) << name;
+    EXPECT_GE(said.event.evidence, said.event.threshold) << name;
+  }
+}
+
+// No propeller becomes larger in flight; how often that would be taken for a loss is in docs/evidence_effectiveness.md.
+TEST(Effectiveness, ASuddenExcessIsNotTheLossOfAnother) {
+  for (const char* name : {"unbalance_medium", "unbalance_hexa", "f450"}) {
+    const auto outcome = fly_with_excess(name, 12, 0.3, 10.0);
+    ASSERT_FALSE(outcome.ours.empty()) << name;
+    EXPECT_EQ(outcome.ours.front().rotor, 1U) << name;
+    EXPECT_EQ(outcome.ours.front().kind, effectiveness::LossKind::kOverEffective) << name;
+  }
+}
+
+// A full battery, cold air, a lighter vehicle: all rotors give more than described, and none is to blame.
+TEST(Effectiveness, AnExcessOfAllRotorsIsNobodys) {
+  for (const double excess : {-0.25, 0.25}) {
+    EffectivenessFlight flight = flight_of("unbalance_medium", 14, Manoeuvre::kRandom);
+    flight.duration_s = 60.0;
+    Multirotor described = flight.vehicle;
+    described.thrust_coefficient_N_s2 /= 1.0 + excess;
+    const auto outcome = fly(flight, effectiveness_params(described));
+    EXPECT_TRUE(outcome.ours.empty()) << excess;
+    EXPECT_GT(outcome.judged_s, 30.0);
   }
 }
 

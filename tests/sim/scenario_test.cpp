@@ -94,6 +94,7 @@ TEST(Scenario, EveryKindIsReadUnderItsWord) {
            {"unbalance", "rotor = 1\ntip_mass_mg = 10.0\n"},
            {"propeller_lost", "rotor = 1\n"},
            {"partial_loss", "rotor = 1\nloss_ratio = 0.3\n"},
+           {"over_effective", "rotor = 1\nexcess_ratio = 0.3\n"},
            {"stuck_command", "rotor = 1\n"},
            {"dead_esc", "rotor = 1\n"},
            {"desync", "rotor = 1\n"},

@@ -44,13 +44,27 @@ constexpr double kCautious = 2.0;             // times the threshold near the gr
 
 std::array<LossRange<double>, kLossRanges> ranges_of(const EffectivenessParams& params) {
   return {LossRange<double>{kLeastFullLoss, kFullLoss, kQuickMemory_s},
-          LossRange<double>{params.least_loss_ratio, kFullLoss, kSlowMemory_s}};
+          LossRange<double>{params.least_loss_ratio, kFullLoss, kSlowMemory_s},
+          LossRange<double>{-params.least_loss_ratio, -kFullLoss, kSlowMemory_s}};
 }
 
 RotorLossParams<double> test_params_of(const EffectivenessParams& params) {
   RotorLossParams<double> result;
   result.threshold = loss_threshold(params.false_alarms_per_hour, params.samples_per_s,
                                     kLossRanges * params.vehicle.rotor_count);
+  return result;
+}
+
+SlowEvidenceParams slow_params_of(const EffectivenessParams& params) {
+  SlowEvidenceParams result;
+  result.vehicle = params.vehicle;
+  result.effectiveness = params.effectiveness;
+  result.speeds = params.speeds;
+  result.false_alarms_per_hour = params.false_alarms_per_hour;
+  result.propeller_spread_ratio = params.propeller_spread_ratio;
+  result.offset_ratio = params.offset_ratio;
+  result.gain_ratio = params.noise.gain_error_ratio;
+  result.least_excess_ratio = params.least_loss_ratio;
   return result;
 }
 
@@ -71,7 +85,11 @@ EffectivenessMonitor::EffectivenessMonitor(const EffectivenessParams& params) no
       speeds_{params.speeds},
       test_{params.vehicle.rotor_count, test_params_of(params), ranges_of(params)},
       tilt_{params.vehicle.rotor_count, std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)},
-      delay_{std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)} {
+      delay_{std::max(kTiltInterval_s, 2.0 * params.speeds.time_constant_s)},
+      slow_{slow_params_of(params)} {
+  mapping_threshold_ =
+      loss_threshold(params.false_alarms_per_hour, 2.0 * (1.0 - kMappingKeep) / kMappingPeriod_s,
+                     RotorMapping<double>::hypotheses(params.vehicle.rotor_count));
   effectiveness_.fill(1.0);
   const std::size_t n = params_.vehicle.rotor_count;
   constexpr std::array kRows{kRollRow, kPitchRow, kVerticalRow};
@@ -86,12 +104,7 @@ EffectivenessMonitor::EffectivenessMonitor(const EffectivenessParams& params) no
   }
   const Multirotor& vehicle = params_.vehicle;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto& hub = vehicle.rotor[i].position_m;
-    const auto& axis = vehicle.rotor[i].thrust_axis;
-    const double per_speed =
-        vehicle.propeller_radius_m > 0.0 ? vehicle.inflow_ratio / vehicle.propeller_radius_m : 0.0;
-    inflow_per_rate_[i] = {per_speed * (hub[1] * axis[2] - hub[2] * axis[1]),
-                           per_speed * (hub[2] * axis[0] - hub[0] * axis[2])};
+    inflow_per_rate_[i] = inflow_per_rate(vehicle, i);
     vertical_at_imu_[i] = params_.effectiveness.per_speed2[kVerticalRow][i] +
                           params_.effectiveness.per_speed2[kRollRow][i] * vehicle.imu_position_m[1] -
                           params_.effectiveness.per_speed2[kPitchRow][i] * vehicle.imu_position_m[0];
@@ -156,6 +169,7 @@ void EffectivenessMonitor::on_report(LandedReport report) noexcept {
 std::optional<LossEvent> EffectivenessMonitor::on_speeds(TimePoint time,
                                                          std::span<const double> speed_rad_s) noexcept {
   speeds_.on_speed(time, speed_rad_s);
+  slow_.on_speeds(time, speed_rad_s);
   return process(time);
 }
 
@@ -172,6 +186,8 @@ std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
     const Inertial& sample = waiting_[waiting_first_];
     if (sample.time > known) break;
     event = step(sample, now);
+    const auto excess = watch_slowly(sample);
+    if (!event && excess) event = event_of(*excess, now);
     waiting_first_ = (waiting_first_ + 1) % kWaiting;
     --waiting_count_;
   }
@@ -243,7 +259,10 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
   // still looked for.
   const bool may_land = sample.phase == Phase::kLanding;
   cautious_ = may_land && reported_in_air_ && in_flight_since_;
-  if (sample.phase != Phase::kInFlight && !may_land) in_flight_since_.reset();
+  if (sample.phase != Phase::kInFlight && !may_land) {
+    in_flight_since_.reset();
+    slow_.end_flight();
+  }
   if (sample.phase != Phase::kInFlight && !cautious_) return Muted::kPhase;
   if (mean_step_s_ > 1.0 / kLeastRate_Hz) return Muted::kTooSlow;
   if (struck_ && sample.time - *struck_ < kStruck) return Muted::kStruck;
@@ -326,7 +345,8 @@ void EffectivenessMonitor::watch_mapping(const Inertial& sample, double dt_s) no
   if (mapping_age_s_ < kMappingPeriod_s) return;
   mapping_age_s_ = 0.0;
   if (mapping_ == Mapping::kWrongNumbers) return;
-  mapping_ = RotorMapping<double>::judge(tilt_, params_.effectiveness);
+  numbering_ = RotorMapping<double>::judge(tilt_, params_.effectiveness, mapping_threshold_);
+  mapping_ = numbering_.mapping;
   mapping_was_plausible_ = mapping_was_plausible_ || mapping_ == Mapping::kPlausible;
   tilt_.fade(kMappingKeep);
 }
@@ -485,14 +505,22 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   event.rotor = finding->rotor;
   event.effectiveness = effectiveness_[event.rotor] * (1.0 - finding->loss);
   event.sigma = effectiveness_[event.rotor] * std::sqrt(finding->loss_variance);
-  event.probability_lost = LossOfEffectivenessFilter<double>::probability_below(
-      params_.lost_below_ratio, event.effectiveness, event.sigma * event.sigma);
-  const bool is_lost = event.probability_lost > params_.lost_probability;
+  const auto probability_below = [&event](double effectiveness) {
+    return LossOfEffectivenessFilter<double>::probability_below(effectiveness, event.effectiveness,
+                                                                event.sigma * event.sigma);
+  };
+  event.probability = probability_below(params_.lost_below_ratio);
+  const bool is_lost = event.probability > params_.lost_probability;
   // The first milliseconds show less than is lost: filters of the sensor hold back what has just begun.
   const bool is_partial = event.effectiveness > kSurelyPartial && age >= kEarliestPartial;
   if (!is_lost && !is_partial && age < params_.most_classifying) return std::nullopt;
-  event.kind = event.probability_lost > 0.5 ? LossKind::kPropellerLost : LossKind::kPartialLoss;
+  event.kind = event.probability > 0.5 ? LossKind::kPropellerLost : LossKind::kPartialLoss;
+  if (event.effectiveness > 1.0) {
+    event.kind = LossKind::kOverEffective;
+    event.probability = 1.0 - probability_below(1.0);
+  }
   event.evidence = finding->evidence;
+  event.threshold = test_.threshold();
   event.second = finding->second;
   event.unexplained = finding->unexplained;
   event.onset = finding->onset;
@@ -504,6 +532,7 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
 
 void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& finding) noexcept {
   effectiveness_[event.rotor] = std::max(0.0, event.effectiveness);
+  slow_.believe(event.rotor, effectiveness_[event.rotor]);
   if (event.kind == LossKind::kPropellerLost) {
     lost_ = event.rotor;
     muted_ = Muted::kRotorLost;
@@ -512,6 +541,29 @@ void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& 
     rate_[axis].shift(finding.rate_shift[axis], finding.disturbance_shift[axis]);
   vertical_.shift(finding.disturbance_shift[2]);
   test_.reset();
+}
+
+std::optional<SlowEvidence::Excess> EffectivenessMonitor::watch_slowly(const Inertial& sample) noexcept {
+  const bool is_flying = (muted_ == Muted::kNot || muted_ == Muted::kMappingUnknown) && in_flight_since_ &&
+                         sample.time - *in_flight_since_ >= params_.settle_partial && !cautious_;
+  return slow_.on_imu({sample.time, sample.accel_m_s2, sample.gyro_rad_s, is_flying, muted_ == Muted::kNot});
+}
+
+LossEvent EffectivenessMonitor::event_of(const SlowEvidence::Excess& excess, TimePoint now) noexcept {
+  LossEvent event;
+  event.kind = LossKind::kOverEffective;
+  event.rotor = excess.rotor;
+  event.effectiveness = excess.effectiveness;
+  event.sigma = excess.sigma;
+  event.probability = excess.probability;
+  event.evidence = excess.evidence;
+  event.threshold = slow_.excess_threshold();
+  event.second = excess.second;
+  event.is_over = excess.is_over;
+  event.onset = excess.since;
+  event.sample = excess.sample;
+  event.decided = now;
+  return event;
 }
 
 }  // namespace airworthy::effectiveness

@@ -8,6 +8,7 @@
 
 #include "core/detectors/effectiveness/rotor_loss_test.h"
 #include "core/detectors/effectiveness/rotor_mapping.h"
+#include "core/detectors/effectiveness/slow_evidence.h"
 #include "core/detectors/flight_phase.h"
 #include "core/estimators/effectiveness/control_regression.h"
 #include "core/estimators/effectiveness/disturbed_axis.h"
@@ -18,8 +19,8 @@
 
 namespace airworthy::effectiveness {
 
-/// A sudden great loss, and a smaller one that shows later.
-inline constexpr std::size_t kLossRanges = 2;
+/// A sudden great loss, a smaller one that shows later, and a sudden gain.
+inline constexpr std::size_t kLossRanges = 3;
 
 /// How far the model may be wrong. Accelerations in shares of what one rotor gives in hover, so that the same
 /// numbers fit a vehicle of 39 g and one of 6 kg.
@@ -46,8 +47,10 @@ struct EffectivenessParams {
   ModelNoise noise;
   double false_alarms_per_hour = 1e-4;
   double samples_per_s = 500.0;
-  double least_loss_ratio = 0.15;  ///< the smallest that is looked for
-  double lost_below_ratio = 0.3;   ///< effectiveness of what counts as lost
+  double least_loss_ratio = 0.15;        ///< the smallest loss, or excess, that is looked for
+  double propeller_spread_ratio = 0.04;  ///< by how much healthy propellers differ, one standard deviation
+  double offset_ratio = 0.04;            ///< and the centre of mass from its place, in shares of the mean arm
+  double lost_below_ratio = 0.3;         ///< effectiveness of what counts as lost
   double lost_probability = 0.9;
   bool mapping_is_known = false;       ///< as after a calibration: no need to wait for proof in flight
   bool learns_inertial_delay = false;  ///< the streams are stamped on arrival: see StreamDelay
@@ -73,20 +76,26 @@ enum class Muted : std::uint8_t {
   kRotorLost,       ///< what is left cannot be judged
 };
 
-enum class LossKind : std::uint8_t { kPropellerLost, kPartialLoss };
+enum class LossKind : std::uint8_t {
+  kPropellerLost,
+  kPartialLoss,
+  kOverEffective,  ///< more thrust than described: a larger or steeper propeller
+};
 
 struct LossEvent {
   LossKind kind = LossKind::kPartialLoss;
   std::size_t rotor = 0;
   double effectiveness = 1.0;
   double sigma = 0.0;
-  double probability_lost = 0.0;
+  double probability = 0.0;  ///< of being lost; of an excess, that there is one
   double evidence = 0.0;
+  double threshold = 0.0;
   double second = 0.0;
   double unexplained = 0.0;
-  TimePoint onset{};    ///< estimated
-  TimePoint sample{};   ///< newest inertial sample that took part
-  TimePoint decided{};  ///< of the message with which it was decided
+  bool is_over = false;  ///< an excess that no longer shows
+  TimePoint onset{};     ///< estimated; of what was there at take-off, since when it has been looked at
+  TimePoint sample{};    ///< newest inertial sample that took part
+  TimePoint decided{};   ///< of the message with which it was decided
 };
 
 /// What pushes the vehicle along one axis in the rotor plane. A lost rotor does not.
@@ -148,9 +157,16 @@ class EffectivenessMonitor {
   /// What the model now takes for rotor i: 1, or what was found.
   [[nodiscard]] double effectiveness(std::size_t i) const noexcept { return effectiveness_[i]; }
   [[nodiscard]] std::optional<std::size_t> lost_rotor() const noexcept { return lost_; }
+  [[nodiscard]] const SlowEvidence& slow() const noexcept { return slow_; }
   [[nodiscard]] Mapping mapping() const noexcept { return mapping_; }
   /// How much later than the rotor speeds the inertial data are stamped, as learned; 0 where it is not.
   [[nodiscard]] Duration inertial_delay() const noexcept { return inertial_delay_; }
+  /// What explains the motion where mapping() is kWrongNumbers.
+  [[nodiscard]] const RotorMapping<double>::Verdict& numbering() const noexcept { return numbering_; }
+  /// Bit i: rotor i turns the other way than described; nothing while nobody says so, or while the numbering is wrong.
+  [[nodiscard]] std::optional<std::uint32_t> wrong_spin() const noexcept {
+    return mapping_ == Mapping::kWrongNumbers ? std::nullopt : slow_.wrong_spin();
+  }
   [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
   [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
@@ -181,6 +197,8 @@ class EffectivenessMonitor {
   [[nodiscard]] bool is_beyond_ground(const Test::Finding& finding) const noexcept;
   std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
   void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
+  std::optional<SlowEvidence::Excess> watch_slowly(const Inertial& sample) noexcept;
+  [[nodiscard]] LossEvent event_of(const SlowEvidence::Excess& excess, TimePoint now) noexcept;
 
   EffectivenessParams params_;
   RotorSpeedPredictor<double> speeds_;
@@ -223,7 +241,10 @@ class EffectivenessMonitor {
   std::optional<TimePoint> delay_added_;
   Duration inertial_delay_{0};
   bool delay_is_known_ = false;
+  SlowEvidence slow_;
   Mapping mapping_ = Mapping::kUnknown;
+  RotorMapping<double>::Verdict numbering_{};
+  double mapping_threshold_ = 0.0;
   bool mapping_was_plausible_ = false;
   double mapping_age_s_ = 0.0;
   Observer observer_ = nullptr;

@@ -23,7 +23,7 @@ struct MotionSample {
   std::array<std::array<Scalar, 3>, kMost> contribution{};
 };
 
-/// Which losses one bank of hypotheses looks for, as a share of the rotor's thrust.
+/// Which losses one bank of hypotheses looks for, as a share of the rotor's thrust; negative: gains.
 template <class Scalar>
 struct LossRange {
   Scalar least;
@@ -192,7 +192,8 @@ class RotorLossTest {
       window = Window{};
       return;
     }
-    window.loss = std::clamp(window.a / window.b, range.least, range.most);  // (2)
+    window.loss = std::clamp(window.a / window.b, std::min(range.least, range.most),
+                             std::max(range.least, range.most));  // (2)
     window.evidence = ratio(window.loss);
     window.everything = Scalar{0};
     for (std::size_t axis = 0; axis < 3; ++axis) {

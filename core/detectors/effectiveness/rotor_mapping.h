@@ -12,10 +12,10 @@ namespace airworthy::effectiveness {
 
 /// Judges whether the rotors are numbered, and the axes pointing, as the vehicle file says.
 ///   Numbering   R² of roll and pitch for the described rows against two rotors swapped, all shifted along the frame,
-///               order reversed, and an axis upside down. Not the sense of rotation: what yaw shows within 10 to
-///               20 ms is less than late telemetry hides, and the judgement of losses does not use it
+///               order reversed, and an axis upside down. For the sense of rotation see SpinRegression
 ///   Odds        n/4·ln((1 − R²_a)/(1 − R²_b)) of b over a, with n intervals of the sums, whose changes share ends
-///   Implausible odds of another over the described > 12;  plausible: of the described over all others > 4
+///   Implausible odds of another over the described above the threshold that follows from the rate of false alarms;
+///               plausible: of the described over all others > 4
 /// Healthy flights explain most of roll and pitch by themselves, so that another numbering cannot win there; a lost
 /// rotor changes one column, which no renumbering repairs.
 enum class Mapping : std::uint8_t { kUnknown, kPlausible, kWrongNumbers };
@@ -29,25 +29,39 @@ class RotorMapping {
   static constexpr std::int64_t kLeastIntervals = 20;
   static constexpr std::int64_t kMostIntervals = 2500;  ///< sums fade: older ones no longer count
   static constexpr Scalar kLeastExplained = Scalar(0.2);
-  static constexpr Scalar kImplausible = Scalar(12);  ///< nats
-  static constexpr Scalar kPlausible = Scalar(4);
+  static constexpr Scalar kPlausible = Scalar(4);  ///< nats
+  using Order = std::array<std::size_t, kMost>;
 
-  [[nodiscard]] static Mapping judge(const Regression& tilt,
-                                     const EffectivenessMatrix<Scalar>& matrix) noexcept {
+  struct Verdict {
+    Mapping mapping = Mapping::kUnknown;
+    // What explains the motion best: rotor i acts as the file describes rotor order[i]; −1: the axis is upside down.
+    Order order{};
+    Scalar roll_sign = 1;
+    Scalar pitch_sign = 1;
+  };
+
+  /// How many other numberings are compared.
+  [[nodiscard]] static constexpr std::size_t hypotheses(std::size_t n) noexcept {
+    return n * (n - 1) / 2 + 2 * n + 2;
+  }
+
+  [[nodiscard]] static Verdict judge(const Regression& tilt, const EffectivenessMatrix<Scalar>& matrix,
+                                     Scalar threshold) noexcept {
     const std::size_t n = matrix.rotor_count;
     const std::int64_t intervals = 2 * tilt.sums(kRollRow).intervals;
-    if (intervals < 2 * kLeastIntervals) return Mapping::kUnknown;
+    Verdict verdict;
+    if (intervals < 2 * kLeastIntervals) return verdict;
     const Scalar described = tilting(tilt, matrix, identity(n), 1, 1);
-    const Scalar other = best_numbering(tilt, matrix);
-    if (other > kLeastExplained && odds(other, described, intervals) > kImplausible)
-      return Mapping::kWrongNumbers;
-    const bool plausible = described > kLeastExplained && odds(described, other, intervals) > kPlausible;
-    return plausible ? Mapping::kPlausible : Mapping::kUnknown;
+    const Scalar other = best_numbering(tilt, matrix, verdict);
+    if (other > kLeastExplained && odds(other, described, intervals) > threshold) {
+      verdict.mapping = Mapping::kWrongNumbers;
+    } else if (described > kLeastExplained && odds(described, other, intervals) > kPlausible) {
+      verdict.mapping = Mapping::kPlausible;
+    }
+    return verdict;
   }
 
  private:
-  using Order = std::array<std::size_t, kMost>;
-
   static Order identity(std::size_t n) noexcept {
     Order order{};
     for (std::size_t i = 0; i < n; ++i) order[i] = i;
@@ -75,12 +89,17 @@ class RotorMapping {
            Scalar{2};
   }
 
-  static Scalar best_numbering(const Regression& regression,
-                               const EffectivenessMatrix<Scalar>& matrix) noexcept {
+  static Scalar best_numbering(const Regression& regression, const EffectivenessMatrix<Scalar>& matrix,
+                               Verdict& verdict) noexcept {
     const std::size_t n = matrix.rotor_count;
     Scalar best{0};
     const auto consider = [&](const Order& order, Scalar roll, Scalar pitch) {
-      best = std::max(best, tilting(regression, matrix, order, roll, pitch));
+      const Scalar explained = tilting(regression, matrix, order, roll, pitch);
+      if (explained <= best) return;
+      best = explained;
+      verdict.order = order;
+      verdict.roll_sign = roll;
+      verdict.pitch_sign = pitch;
     };
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = i + 1; j < n; ++j) {

@@ -41,4 +41,16 @@ struct EffectivenessMatrix {
   }
 };
 
+/// How much faster the air meets rotor i when the body turns, over the speed of the rotor, per p and q: a rotor that moves
+/// along its axis with v gives κω(ω − c_in·v/R), v = Ω·(hub × axis).
+[[nodiscard]] inline std::array<double, 2> inflow_per_rate(const Multirotor& vehicle,
+                                                           std::size_t i) noexcept {
+  const auto& hub = vehicle.rotor[i].position_m;
+  const auto& axis = vehicle.rotor[i].thrust_axis;
+  const double per_speed =
+      vehicle.propeller_radius_m > 0.0 ? vehicle.inflow_ratio / vehicle.propeller_radius_m : 0.0;
+  return {per_speed * (hub[1] * axis[2] - hub[2] * axis[1]),
+          per_speed * (hub[2] * axis[0] - hub[0] * axis[2])};
+}
+
 }  // namespace airworthy

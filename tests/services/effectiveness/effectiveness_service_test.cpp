@@ -26,7 +26,12 @@ EffectivenessConfig quad_config() {
 /// A simulated quadrotor on an in-process bus, and the service listening.
 class EffectivenessServiceTest : public ::testing::Test {
  protected:
-  EffectivenessServiceTest() {
+  EffectivenessServiceTest() : EffectivenessServiceTest{quad_config(), plan()} {}
+
+  /// What flies is as the shipped configuration describes it, whatever `config` says.
+  EffectivenessServiceTest(EffectivenessConfig config, const sim::Scenario& scenario)
+      : config_{std::move(config)},
+        simulation_{quad_config().monitor.vehicle, scenario, sim::Realism::at(sim::Level::kHard), 3} {
     observer_.subscribe<fault_event_t>(channel::kFaultEvent, [this](const fault_event_t& event) {
       events_.push_back(event);
       told_at_.push_back(clock_.now());
@@ -45,6 +50,12 @@ class EffectivenessServiceTest : public ::testing::Test {
     return scenario;
   }
 
+  static sim::Scenario healthy() {
+    sim::Scenario scenario = plan();
+    scenario.faults.clear();
+    return scenario;
+  }
+
   void fly_until(double time_s) {
     while (simulation_.time_s() < time_s) {
       simulation_.step(output_);
@@ -57,9 +68,9 @@ class EffectivenessServiceTest : public ::testing::Test {
   std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
   rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
   rt::Log log_{"test", rt::LogLevel::kError};
-  EffectivenessConfig config_ = quad_config();
+  EffectivenessConfig config_;
   sim::LogOutput output_{*bus_, config_.vehicle, 4, 1};
-  sim::Simulation simulation_{config_.monitor.vehicle, plan(), sim::Realism::at(sim::Level::kHard), 3};
+  sim::Simulation simulation_;
   rt::Node observer_{*bus_, clock_, log_, {config_.vehicle, "observer", 4}};
   rt::Node node_{*bus_, clock_, log_, {config_.vehicle, "airworthy-effectiveness", 5}};
   EffectivenessService service_{node_, config_};
@@ -103,6 +114,85 @@ TEST_F(EffectivenessServiceTest, NamesTheRotorThatLostItsPropeller) {
   ASSERT_EQ(status_.active.size(), 1U);
   EXPECT_THAT(status_.muted_reason, HasSubstr("rotor 3 is lost"));
   EXPECT_EQ(status_.components[0].judged, 0);
+}
+
+EffectivenessConfig config_with_a_wrong_spin() {
+  EffectivenessConfig config = quad_config();
+  config.monitor.vehicle.rotor[2].spin = -config.monitor.vehicle.rotor[2].spin;
+  config.monitor.effectiveness = EffectivenessMatrix<double>::of(config.monitor.vehicle);
+  return config;
+}
+
+EffectivenessConfig config_with_swapped_rotors() {
+  EffectivenessConfig config = quad_config();
+  std::swap(config.monitor.vehicle.rotor[0], config.monitor.vehicle.rotor[2]);
+  config.monitor.effectiveness = EffectivenessMatrix<double>::of(config.monitor.vehicle);
+  return config;
+}
+
+class WrongSpin : public EffectivenessServiceTest {
+ protected:
+  WrongSpin() : EffectivenessServiceTest{config_with_a_wrong_spin(), healthy()} {}
+};
+
+TEST_F(WrongSpin, IsAFaultOfTheVehicleFile) {
+  fly_until(50.0);
+  ASSERT_FALSE(events_.empty());
+  for (const fault_event_t& event : events_) {
+    EXPECT_EQ(event.component, "vehicle file");
+    EXPECT_EQ(event.fault_kind, "implausible_configuration");
+    EXPECT_EQ(event.severity, 1);
+    EXPECT_EQ(event.latched, 1);
+  }
+  EXPECT_EQ(events_.back().summary,
+            "rotor 3 seems to turn clockwise, the vehicle file says counter-clockwise");
+  EXPECT_EQ(events_.back().evidence.at(0).name, "log_likelihood_ratio");
+  EXPECT_GE(events_.back().evidence.at(0).value, events_.back().evidence.at(1).value);
+  ASSERT_EQ(status_.active.size(), 1U);
+  // Losses are judged without the sense of rotation.
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMonitoring)) << status_.muted_reason;
+}
+
+class SwappedRotors : public EffectivenessServiceTest {
+ protected:
+  SwappedRotors() : EffectivenessServiceTest{config_with_swapped_rotors(), healthy()} {}
+};
+
+TEST_F(SwappedRotors, AreAFaultOfTheVehicleFileAndMute) {
+  fly_until(50.0);
+  ASSERT_EQ(events_.size(), 1U);
+  EXPECT_EQ(events_[0].component, "vehicle file");
+  EXPECT_EQ(events_[0].summary, "rotors 1 and 3 seem to be swapped in the vehicle file");
+  EXPECT_EQ(status_.muted_reason,
+            "vehicle file implausible: rotors 1 and 3 seem to be swapped in the vehicle file");
+}
+
+class WrongPropeller : public EffectivenessServiceTest {
+ protected:
+  WrongPropeller() : EffectivenessServiceTest{quad_config(), too_much_thrust()} {}
+
+  static sim::Scenario too_much_thrust() {
+    sim::Scenario scenario = plan();
+    scenario.faults = {
+        {.kind = sim::FaultKind::kOverEffective, .onset_s = 0.0, .rotor = 2, .magnitude = 0.7}};
+    return scenario;
+  }
+};
+
+TEST_F(WrongPropeller, IsNamedWithWhatItGives) {
+  fly_until(60.0);
+  ASSERT_FALSE(events_.empty());
+  const fault_event_t& event = events_[0];
+  EXPECT_EQ(event.phase, 1);
+  EXPECT_EQ(event.component, "rotor 2");
+  EXPECT_EQ(event.fault_kind, "over_effective");
+  EXPECT_EQ(event.severity, 2);
+  EXPECT_EQ(event.latched, 0);
+  EXPECT_NEAR(event.magnitude, 1.7, 0.3);
+  EXPECT_GT(event.probability, 0.99);
+  EXPECT_THAT(event.summary, HasSubstr("is it the right propeller?"));
+  for (const fault_event_t& one : events_) EXPECT_EQ(one.component, "rotor 2");
+  ASSERT_EQ(status_.active.size(), 1U);
 }
 
 TEST_F(EffectivenessServiceTest, SilenceOfTheInertialUnitIsNotHealth) {

@@ -124,6 +124,22 @@ TEST(EffectivenessMonitor, ReadsWhatIsLeftAndThenWhatIsLost) {
   EXPECT_EQ(hover.event->kind, LossKind::kPropellerLost);
 }
 
+TEST(EffectivenessMonitor, ReadsASuddenExcess) {
+  Hover hover;
+  hover.fly(5.0);
+  hover.effectiveness[2] = 1.4;
+  hover.fly(1.0);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->kind, LossKind::kOverEffective);
+  EXPECT_EQ(hover.event->rotor, 2U);
+  EXPECT_NEAR(hover.event->effectiveness, 1.4, 4.0 * hover.event->sigma + 0.02);
+  EXPECT_GT(hover.event->probability, 0.99);
+  EXPECT_EQ(hover.event->threshold, hover.monitor.test().threshold());
+  hover.event.reset();
+  hover.fly(3.0);
+  EXPECT_FALSE(hover.event) << "the model now expects it";
+}
+
 TEST(EffectivenessMonitor, IsMutedWithAReason) {
   Hover hover;
   hover.phase = Phase::kTakeOff;

@@ -125,6 +125,24 @@ TEST(RotorLossTest, AGreaterLossIsNeverFoundLater) {
   }
 }
 
+TEST(RotorLossTest, AGainIsItsOwnAndNotTheLossOfTheOpposite) {
+  constexpr std::array<LossRange<double>, 3> kWithGains{
+      LossRange<double>{0.5, 1.1, 1e9}, {0.15, 1.1, 1e9}, {-0.15, -1.1, 1e9}};
+  for (const double gain : {0.3, 0.8}) {
+    RotorLossTest<double, kMaxRotors, 3> test{4, {}, kWithGains};
+    int steps = 0;
+    while (!test.finding() && steps < 1000) test.step(white_sample(steps++, trace_of_loss(1, -gain)));
+    const auto finding = test.finding();
+    ASSERT_TRUE(finding) << gain;
+    EXPECT_EQ(finding->range, 2U);
+    EXPECT_EQ(finding->rotor, 1U);
+    EXPECT_NEAR(finding->loss, -gain, 1e-9);
+    // Of the rivals the opposite rotor comes nearest: the same moments, the wrong lift.
+    EXPECT_GT(finding->second, 0.0);
+    EXPECT_LT(finding->second, finding->evidence - 8.0);
+  }
+}
+
 TEST(RotorLossTest, UsesNoHeap) {
   const test::AllocationGuard guard;
   LossTest test{4, {}, kRanges};

@@ -1,5 +1,6 @@
 #include "core/detectors/effectiveness/rotor_mapping.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -44,6 +45,13 @@ ControlRegression<double> flown(const EffectivenessMatrix<double>& real, double 
   return regression;
 }
 
+constexpr double kThreshold = 20.0;
+
+RotorMapping<double>::Verdict judged(const ControlRegression<double>& regression,
+                                     const EffectivenessMatrix<double>& described) {
+  return RotorMapping<double>::judge(regression, described, kThreshold);
+}
+
 TEST(ControlRegression, FindsTheGainOfAnAxis) {
   EffectivenessMatrix<double> real = quad();
   for (double& one : real.per_speed2[kRollRow]) one *= 1.3;
@@ -56,27 +64,29 @@ TEST(ControlRegression, FindsTheGainOfAnAxis) {
 }
 
 TEST(RotorMapping, TellsTheDescribedNumberingFromOthers) {
-  EXPECT_EQ(RotorMapping<double>::judge(flown(quad(), 20.0, 0.02), quad()), Mapping::kPlausible);
+  EXPECT_EQ(judged(flown(quad(), 20.0, 0.02), quad()).mapping, Mapping::kPlausible);
   EffectivenessMatrix<double> swapped = quad();
   for (auto& row : swapped.per_speed2) std::swap(row[0], row[2]);
-  EXPECT_EQ(RotorMapping<double>::judge(flown(quad(), 20.0, 0.02), swapped), Mapping::kWrongNumbers);
+  const auto named = judged(flown(quad(), 20.0, 0.02), swapped);
+  EXPECT_EQ(named.mapping, Mapping::kWrongNumbers);
+  EXPECT_THAT(std::vector(named.order.begin(), named.order.begin() + 4), testing::ElementsAre(2, 1, 0, 3));
   EffectivenessMatrix<double> shifted = quad();
   for (auto& row : shifted.per_speed2) std::rotate(row.begin(), row.begin() + 1, row.begin() + 4);
-  EXPECT_EQ(RotorMapping<double>::judge(flown(quad(), 20.0, 0.02), shifted), Mapping::kWrongNumbers);
+  EXPECT_EQ(judged(flown(quad(), 20.0, 0.02), shifted).mapping, Mapping::kWrongNumbers);
   EffectivenessMatrix<double> mirrored = quad();
   for (double& one : mirrored.per_speed2[kRollRow]) one = -one;
-  EXPECT_EQ(RotorMapping<double>::judge(flown(quad(), 20.0, 0.02), mirrored), Mapping::kWrongNumbers);
+  EXPECT_EQ(judged(flown(quad(), 20.0, 0.02), mirrored).mapping, Mapping::kWrongNumbers);
 }
 
 TEST(RotorMapping, SaysNothingWithoutInformation) {
-  EXPECT_EQ(RotorMapping<double>::judge(flown(quad(), 0.5, 0.02), quad()), Mapping::kUnknown) << "too short";
-  EXPECT_EQ(RotorMapping<double>::judge(flown(quad(), 20.0, 20.0), quad()), Mapping::kUnknown) << "too noisy";
+  EXPECT_EQ(judged(flown(quad(), 0.5, 0.02), quad()).mapping, Mapping::kUnknown) << "too short";
+  EXPECT_EQ(judged(flown(quad(), 20.0, 20.0), quad()).mapping, Mapping::kUnknown) << "too noisy";
 }
 
 TEST(RotorMapping, ALostRotorIsNoNumbering) {
   EffectivenessMatrix<double> lost = quad();
   for (auto& row : lost.per_speed2) row[3] = 0.0;
-  EXPECT_NE(RotorMapping<double>::judge(flown(lost, 20.0, 0.02), quad()), Mapping::kWrongNumbers);
+  EXPECT_NE(judged(flown(lost, 20.0, 0.02), quad()).mapping, Mapping::kWrongNumbers);
 }
 
 }  // namespace

@@ -1,0 +1,188 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "core/detectors/effectiveness/effectiveness_monitor.h"
+#include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
+#include "tests/support/reference/dense_effectiveness_filter.h"
+
+namespace airworthy::bench {
+
+inline constexpr double kHover_rad_s = 640.0;
+
+inline Multirotor ring(std::size_t rotors) {
+  Multirotor vehicle;
+  vehicle.mass_kg = 0.5;
+  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
+  vehicle.thrust_coefficient_N_s2 = 8e-6 / static_cast<double>(rotors);
+  vehicle.torque_ratio_m = 0.012;
+  vehicle.propeller_radius_m = 0.07;
+  vehicle.propeller_inertia_kg_m2 = 5e-6;
+  vehicle.motor_time_constant_s = 0.02;
+  vehicle.speed_min_rad_s = 100.0;
+  vehicle.speed_max_rad_s = 1300.0;
+  vehicle.rotor_count = rotors;
+  for (std::size_t i = 0; i < rotors; ++i) {
+    const double angle = 6.283185307179586 * (static_cast<double>(i) + 0.5) / static_cast<double>(rotors);
+    vehicle.rotor[i].position_m = {0.14 * std::cos(angle), 0.14 * std::sin(angle), -0.01};
+    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
+  }
+  return vehicle;
+}
+
+/// A rate that saws up and down, the same for all.
+struct Saw {
+  double value = 0.0;
+
+  double next() {
+    value = value > 1.0 ? 0.0 : value + 0.01;
+    return value;
+  }
+};
+
+/// The filter as it flies, low-passes included.
+template <class Scalar, std::size_t N>
+struct FilterSteps {
+  LossOfEffectivenessFilter<Scalar> filter{EffectivenessMatrix<Scalar>::of(ring(N)), {}};
+  std::array<Scalar, N> speed{};
+  Saw rate;
+
+  FilterSteps() { speed.fill(Scalar(kHover_rad_s)); }
+
+  double step() {
+    const Scalar now = static_cast<Scalar>(rate.next());
+    static_cast<void>(
+        filter.update(Scalar(0.002), std::span<const Scalar>{speed}, {now, -now, Scalar{0}}, Scalar(-9.8)));
+    return static_cast<double>(filter.effectiveness(0));
+  }
+};
+
+/// The Kalman update alone, dense, of run-time size.
+template <std::size_t N>
+struct TextbookFilterSteps {
+  static constexpr auto kSize = static_cast<Eigen::Index>(N);
+
+  TextbookFilterSteps() {
+    const auto matrix = EffectivenessMatrix<double>::of(ring(N));
+    for (std::size_t i = 0; i < N; ++i) {
+      H.col(static_cast<Eigen::Index>(i)) << matrix.per_speed2[kRollRow][i], matrix.per_speed2[kPitchRow][i],
+          matrix.per_speed2[kVerticalRow][i];
+    }
+    H *= kHover_rad_s * kHover_rad_s;
+  }
+
+  Eigen::MatrixXd H{3, kSize};
+  Eigen::MatrixXd R = Eigen::MatrixXd::Identity(3, 3);
+  Eigen::VectorXd z{3};
+  reference::DenseEffectivenessFilter filter{Eigen::VectorXd::Ones(kSize),
+                                             0.01 * Eigen::MatrixXd::Identity(kSize, kSize)};
+  Saw rate;
+
+  double step() {
+    const double now = rate.next();
+    z << now, -now, -9.8;
+    filter.update(H, z, R, 0.01, 0.0, 1.5);
+    return filter.k(0);
+  }
+};
+
+/// The Kalman update alone, in plain loops of fixed size.
+template <std::size_t N>
+struct ByHandFilterSteps {
+  EffectivenessMatrix<double> matrix = EffectivenessMatrix<double>::of(ring(N));
+  double k[N];
+  double p[N][N] = {};
+  Saw rate;
+
+  ByHandFilterSteps() {
+    for (double& one : k) one = 1.0;
+  }
+
+  double step() {
+    constexpr std::array kRows{kRollRow, kPitchRow, kVerticalRow};
+    const double now = rate.next();
+    const double z[3] = {now, -now, -9.8};
+    for (std::size_t i = 0; i < N; ++i) p[i][i] += 0.01;
+    for (std::size_t row = 0; row < 3; ++row) {
+      double h[N];
+      double ph[N];
+      double innovation = z[row];
+      double variance = 1.0;
+      for (std::size_t i = 0; i < N; ++i) {
+        h[i] = matrix.per_speed2[kRows[row]][i] * kHover_rad_s * kHover_rad_s;
+        innovation -= h[i] * k[i];
+      }
+      for (std::size_t i = 0; i < N; ++i) {
+        ph[i] = 0.0;
+        for (std::size_t j = 0; j < N; ++j) ph[i] += p[i][j] * h[j];
+        variance += h[i] * ph[i];
+      }
+      for (std::size_t i = 0; i < N; ++i) {
+        const double gain = ph[i] / variance;
+        k[i] += gain * innovation;
+        for (std::size_t j = 0; j < N; ++j) p[i][j] -= gain * ph[j];
+      }
+    }
+    for (double& one : k) one = one < 0.0 ? 0.0 : one > 1.5 ? 1.5 : one;
+    return k[0];
+  }
+};
+
+/// One inertial sample of the whole detector.
+template <std::size_t N>
+struct DetectorSteps {
+  static effectiveness::EffectivenessParams params() {
+    effectiveness::EffectivenessParams result;
+    result.vehicle = ring(N);
+    result.effectiveness = EffectivenessMatrix<double>::of(result.vehicle);
+    result.mapping_is_known = true;
+    result.speeds = {
+        .rotor_count = N, .time_constant_s = 0.02, .speed_min_rad_s = 100.0, .speed_max_rad_s = 1300.0};
+    return result;
+  }
+
+  effectiveness::EffectivenessMonitor monitor{params()};
+  std::array<double, N> speed{};
+  std::int64_t taken = 0;
+
+  double step() {
+    const TimePoint time = from_us(2000 * ++taken);
+    speed.fill(taken % 2 == 0 ? kHover_rad_s : kHover_rad_s + 0.5);
+    static_cast<void>(monitor.on_speeds(time, speed));
+    const double noise = taken % 3 == 0 ? 0.01 : -0.005;
+    static_cast<void>(monitor.on_imu(time, {0.0, 0.0, -9.8}, {noise, noise, 0.0}, Phase::kInFlight));
+    return monitor.judged_s();
+  }
+};
+
+/// Calls `run` with the steps of a method, by its name in the table of benchmarks; false if there is none.
+template <std::size_t N, class Run>
+bool with_steps(const std::string_view method, const Run& run) {
+  if (method == "filter_double") {
+    run(FilterSteps<double, N>{});
+  } else if (method == "filter_float") {
+    run(FilterSteps<float, N>{});
+  } else if (method == "textbook_filter") {
+    run(TextbookFilterSteps<N>{});
+  } else if (method == "by_hand_filter") {
+    run(ByHandFilterSteps<N>{});
+  } else if (method == "detector_sample") {
+    run(DetectorSteps<N>{});
+  } else {
+    return false;
+  }
+  return true;
+}
+
+template <class Run>
+bool with_steps(const std::string_view method, std::int64_t rotors, const Run& run) {
+  return (rotors == 4 && with_steps<4>(method, run)) || (rotors == 6 && with_steps<6>(method, run)) ||
+         (rotors == 8 && with_steps<8>(method, run));
+}
+
+}  // namespace airworthy::bench
