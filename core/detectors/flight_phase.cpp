@@ -24,6 +24,7 @@ constexpr double kLeverArm_m = 0.05;  // of an accelerometer off the centre of m
 constexpr double kCarried = 0.4;      // unexplained force of a standing vehicle
 constexpr double kThrustOff = 0.4;
 constexpr double kThrustOn = 0.35;
+constexpr double kHovering = 0.6;
 constexpr double kExplained = 0.35;
 constexpr double kTouchDown = 0.35;
 constexpr double kLeaning = 0.3;
@@ -35,6 +36,7 @@ constexpr double kClimb_m_s = 0.5;
 constexpr double kStill_s = 0.25;
 constexpr double kAirborne_s = 0.1;
 constexpr double kFalling_s = 0.1;
+constexpr double kCarried_s = 2.0;
 constexpr double kFree_s = 0.5;
 constexpr double kCalm_s = 1.5;
 constexpr double kSupported_s = 0.05;
@@ -230,8 +232,11 @@ Phase FlightPhase::next(double dt_s) noexcept {
   }
   if (rests) return Phase::kOnGround;
   switch (phase_) {
-    case Phase::kUnknown:
-      return thrust > kThrustOn * g && std::abs(up) < kExplained ? Phase::kTakeOff : Phase::kUnknown;
+    case Phase::kUnknown: {
+      const bool is_carried = carried_.for_s(thrust > kHovering * g && std::abs(up) < kLeaning, dt_s,
+                                             report_ == LandedReport::kInAir ? kStill_s : kCarried_s);
+      return fell || is_airborne || is_carried ? Phase::kInFlight : Phase::kUnknown;
+    }
     case Phase::kOnGround:
       if (fell) return Phase::kInFlight;
       return thrust > kThrustOn * g ? Phase::kTakeOff : Phase::kOnGround;

@@ -43,6 +43,7 @@ enum class LandedReport : std::uint8_t { kUnknown, kOnGround, kInAir, kTakingOff
 ///   from        to         when                                                                 order = priority
 ///   any         Contact    |r| > 2 g + Ω²·5 cm, or |r| > 0.7 g while thrust is low and it moves
 ///   any         OnGround   |r| > 0.4 g, f < 0.4 g, still, for 0.25 s
+///   Unknown     InFlight   |r_up| < 0.3 g and f > 0.6 g for 2 s, for 0.25 s if reported in the air; v > 0.4 m/s
 ///   OnGround    TakeOff    f > 0.35 g, or in the air by (4) or free fall
 ///   TakeOff     InFlight   v > 0.4 m/s and |r_up| < 0.35 g; reported climb > 0.5 m/s; for 0.1 s
 ///   Contact     InFlight   free fall for 0.1 s
@@ -160,6 +161,7 @@ class FlightPhase {
 
   Held still_;
   Held airborne_;
+  Held carried_;
   Held falling_;
   Held free_;
   Held calm_;

@@ -77,6 +77,8 @@ ActuatorService::ActuatorService(rt::Node& node, const ActuatorConfig& config)
   node_.subscribe<esc_status_t>(channel::kEscStatus,
                                 [this](const esc_status_t& message) { on_esc_status(message); });
   node_.subscribe<rotor_command_t>(channel::kRotorCommand, [this](const rotor_command_t& message) {
+    if (message.command_ratio.size() != config_.monitor.vehicle.rotor_count)
+      node_.counters().add("commands.wrong_rotor_count");
     monitor_.on_rotor_commands(from_us(message.header.time_us), message.command_ratio);
   });
   node_.subscribe<attitude_t>(channel::kAttitude, [this](const attitude_t& message) {
@@ -91,6 +93,7 @@ ActuatorService::ActuatorService(rt::Node& node, const ActuatorConfig& config)
 void ActuatorService::on_esc_status(const esc_status_t& message) {
   std::vector<double> speeds = message.speed_rpm;
   for (double& speed : speeds) speed *= kRadSPerRpm;
+  if (speeds.size() != config_.monitor.vehicle.rotor_count) node_.counters().add("speeds.wrong_rotor_count");
   monitor_.on_rotor_speeds(from_us(message.header.time_us), speeds);
 }
 
@@ -205,6 +208,9 @@ rt::DetectorReport ActuatorService::report() const {
                                                evidence_of_axis(axis, monitor_.axis_states()[i], i)));
   }
   node_.counters()["samples_refused"] = monitor_.refused();
+  node_.counters()["attitudes_refused"] = monitor_.refused_attitudes();
+  node_.counters()["speeds_refused"] = monitor_.rotor_input().refused_speeds();
+  node_.counters()["messages_refused"] = monitor_.rotor_input().refused_messages();
   return report;
 }
 

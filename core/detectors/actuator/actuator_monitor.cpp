@@ -84,7 +84,10 @@ void ActuatorMonitor::start_flight() noexcept {
 }
 
 void ActuatorMonitor::on_attitude(double roll_rad, double pitch_rad, double yaw_rad) noexcept {
-  if (!std::isfinite(roll_rad) || !std::isfinite(pitch_rad) || !std::isfinite(yaw_rad)) return;
+  if (!std::isfinite(roll_rad) || !std::isfinite(pitch_rad) || !std::isfinite(yaw_rad)) {
+    ++refused_attitudes_;
+    return;
+  }
   angle_rad_ = {roll_rad, pitch_rad, yaw_rad};
   has_new_angle_ = true;
 }

@@ -124,9 +124,9 @@ class ActuatorMonitor {
   void on_rotor_commands(TimePoint time, std::span<const double> command_ratio) noexcept {
     thrust_.on_commands(time, command_ratio);
   }
-  /// Attitude that is not finite is ignored.
+  /// Attitude that is not finite is refused and counted.
   void on_attitude(double roll_rad, double pitch_rad, double yaw_rad) noexcept;
-  /// Positive up; NaN is not fused.
+  /// Positive up; NaN = not known: not fused.
   void on_climb(double climb_m_s) noexcept;
   /// Estimates and judges. kTimeBackward, kNotFinite: nothing happened.
   UpdateStatus on_imu(const MonitorSample& sample, Phase phase) noexcept;
@@ -142,7 +142,10 @@ class ActuatorMonitor {
   [[nodiscard]] const std::array<LossVerdict, kAxes>& axes() const noexcept { return axis_verdicts_; }
   [[nodiscard]] const std::array<AxisState, kAxes>& axis_states() const noexcept { return axis_states_; }
   [[nodiscard]] double nis() const noexcept { return innovation_.nis; }
+  /// Inertial samples: not finite, or not newer than the one before.
   [[nodiscard]] std::int64_t refused() const noexcept { return refused_; }
+  [[nodiscard]] std::int64_t refused_attitudes() const noexcept { return refused_attitudes_; }
+  [[nodiscard]] const RotorThrust& rotor_input() const noexcept { return thrust_; }
 
  private:
   struct Body;
@@ -190,6 +193,7 @@ class ActuatorMonitor {
   std::array<double, 3> angle_rad_{};
   double climb_m_s_ = std::numeric_limits<double>::quiet_NaN();
   std::int64_t refused_ = 0;
+  std::int64_t refused_attitudes_ = 0;
   std::optional<TimePoint> last_raised_;
 
   std::array<LossVerdict, kMaxRotors> rotor_verdicts_{};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <utility>
@@ -25,21 +26,26 @@ enum class InputSource : std::uint8_t {
 ///   h = J·Σ spinⱼ·ρⱼ·ω̂ⱼ                         angular momentum of the rotors about z                    (4)
 /// Commands tell the torque of this moment; telemetry arrives late, which a feedback loop turns into a loss that is
 /// none, so it only corrects slowly. The limit of ρ keeps a motor that does not follow visible as a loss. With speeds
-/// alone, ω̂ follows them by (1) too, and ρ is 1. Inputs older than 0.5 s are no inputs.
+/// alone, ω̂ follows them by (1) too, and ρ is 1. Inputs more than 0.5 s old, or as far in the future, are no inputs.
 class RotorThrust {
  public:
   using Speeds = std::array<double, kMaxRotors>;
 
   RotorThrust(const Multirotor& vehicle, InputSource source) noexcept : vehicle_{vehicle}, source_{source} {}
 
-  /// NaN = this rotor did not report: its last speed holds. Beyond twice full speed it is no speed.
+  /// NaN = this rotor did not report: its last speed holds. Beyond twice full speed it is no speed, and refused. So is a
+  /// message for another number of rotors, or older than the last.
   void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept {
-    if (speed_rad_s.size() != vehicle_.rotor_count) return;
+    if (speed_rad_s.size() != vehicle_.rotor_count || is_older(time, measured_at_)) return refuse();
     bool any = false;
     const Speeds before = measured_;
     for (std::size_t i = 0; i < speed_rad_s.size(); ++i) {
       const double speed = std::abs(speed_rad_s[i]);
-      if (!(speed < 2.0 * vehicle_.speed_max_rad_s)) continue;
+      if (std::isnan(speed)) continue;
+      if (!(speed < 2.0 * vehicle_.speed_max_rad_s)) {
+        ++refused_speeds_;
+        continue;
+      }
       measured_[i] = speed;
       any = true;
     }
@@ -48,11 +54,11 @@ class RotorThrust {
     if (any) measured_at_ = time;
   }
 
-  /// A message with a command that is not finite is none.
+  /// A message with a command that is not finite, for another number of rotors or older than the last is refused.
   void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept {
-    if (command_ratio.size() != vehicle_.rotor_count) return;
+    if (command_ratio.size() != vehicle_.rotor_count || is_older(time, commanded_at_)) return refuse();
     for (const double ratio : command_ratio) {
-      if (!std::isfinite(ratio)) return;
+      if (!std::isfinite(ratio)) return refuse();
     }
     const double span = vehicle_.speed_max_rad_s - vehicle_.speed_min_rad_s;
     const Speeds before = commanded_;
@@ -85,6 +91,8 @@ class RotorThrust {
   [[nodiscard]] Speeds take_missed_m_s() noexcept { return std::exchange(missed_m_s_, {}); }
 
   [[nodiscard]] bool is_known() const noexcept { return is_known_; }
+  [[nodiscard]] std::int64_t refused_messages() const noexcept { return refused_messages_; }
+  [[nodiscard]] std::int64_t refused_speeds() const noexcept { return refused_speeds_; }
   [[nodiscard]] double speed_rad_s(std::size_t rotor) const noexcept {
     return ratio_[rotor] * modelled_[rotor];
   }
@@ -106,8 +114,12 @@ class RotorThrust {
   static constexpr double kCorrection_s = 2.0;
   static constexpr double kMostCorrection = 0.2;
   static bool is_fresh(const std::optional<TimePoint>& since, TimePoint now) noexcept {
-    return since && now - *since <= kFresh;
+    return since && now - *since <= kFresh && *since - now <= kFresh;
   }
+  static bool is_older(TimePoint time, const std::optional<TimePoint>& last) noexcept {
+    return last && time < *last;
+  }
+  void refuse() noexcept { ++refused_messages_; }
 
   void note_jump(const Speeds& before, const Speeds& after, const std::optional<TimePoint>& last,
                  TimePoint time) noexcept {
@@ -133,6 +145,8 @@ class RotorThrust {
     return ones;
   }();
   double torque_N_m_ = 0.0;
+  std::int64_t refused_messages_ = 0;
+  std::int64_t refused_speeds_ = 0;
   bool is_known_ = false;
 };
 

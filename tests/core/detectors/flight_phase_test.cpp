@@ -57,6 +57,39 @@ TEST_F(FlightPhaseTest, BeginsUnknownAndFindsTheGround) {
   EXPECT_EQ(phase_.phase(), Phase::kOnGround);
 }
 
+TEST_F(FlightPhaseTest, BegunInAHoverItIsInFlightWithinTwoSeconds) {
+  run(1.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kUnknown);
+  run(1.0, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+}
+
+TEST_F(FlightPhaseTest, BegunInAHoverWithAReportItIsInFlightAtOnce) {
+  phase_.on_report(now_, LandedReport::kInAir, 0.0);
+  run(0.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+}
+
+TEST_F(FlightPhaseTest, BegunOnTheGroundWithRotorsTurningItIsNotInFlight) {
+  run(10.0, 0.5, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kUnknown);
+  phase_.on_report(now_, LandedReport::kInAir, 0.0);  // nor does a wrong report make it fly
+  run(10.0, 0.5, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kUnknown);
+  run(0.5, 0.3, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kOnGround);
+}
+
+TEST_F(FlightPhaseTest, InFlightAgainAfterItsThrustWasUnknown) {
+  take_off();
+  tells_speeds_ = false;
+  run(2.0, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kUnknown);
+  tells_speeds_ = true;
+  run(2.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+}
+
 TEST_F(FlightPhaseTest, TakesOffFliesAndLands) {
   run(1.0, 0.05, 1.0);
   run(0.3, 0.7, 1.0);

@@ -208,6 +208,34 @@ TEST(ActuatorMonitor, RefusesWhatIsNoSampleAndNoticesSilence) {
   EXPECT_EQ(flight.monitor.reason(), NotJudged::kNoInput);
 }
 
+TEST(ActuatorMonitor, WhatIsNoAttitudeOrCommandIsCountedAndBlamesNobody) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  Flight flight{4};
+  flight.fly(10);
+  for (int i = 0; i < 2000; ++i) {
+    flight.fly(HoveringMultirotor::kStep_s);
+    flight.monitor.on_attitude(0.0, kNan, 0.0);
+    flight.monitor.on_rotor_commands(flight.now(), std::array{kNan, 0.5, 0.5, 0.5});
+  }
+  EXPECT_EQ(flight.monitor.refused_attitudes(), 2000);
+  EXPECT_EQ(flight.monitor.rotor_input().refused_messages(), 2000);
+  EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+}
+
+TEST(ActuatorMonitor, AClockThatJumpsForwardStartsTheFlightAnewAndBlamesNobody) {
+  Flight flight{4};
+  flight.fly(20);
+  flight.body.time_s += 3600;
+  flight.fly(HoveringMultirotor::kStep_s);
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kNoInput);  // what is known of the rotors is an hour old
+  flight.fly(1);
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kConverging);
+  flight.fly(20);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+  EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+}
+
 TEST(ActuatorMonitor, WithoutRotorInputItSaysSo) {
   HoveringMultirotor body{4, 1};
   ActuatorMonitor monitor{Flight::params(body.vehicle, InputSource::kAuto)};

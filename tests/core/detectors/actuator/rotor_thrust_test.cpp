@@ -71,6 +71,33 @@ TEST(RotorThrust, SpeedsAloneAreFollowed) {
   EXPECT_NEAR(thrust.speed_rad_s(0), 450.0, 1e-3);
 }
 
+TEST(RotorThrust, CountsWhatItRefuses) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  thrust.on_commands(at(1), std::array{0.5, 0.5, 0.5});
+  thrust.on_speeds(at(1), std::array{500.0, 500.0, 500.0});
+  EXPECT_EQ(thrust.refused_messages(), 0);
+  thrust.on_commands(at(1), std::array{0.9, kNan, 0.9});
+  thrust.on_commands(at(1), std::array{0.9, 0.9});
+  thrust.on_commands(at(0.5), std::array{0.9, 0.9, 0.9});
+  thrust.on_speeds(at(1), std::array{900.0, 900.0, 900.0, 900.0});
+  thrust.on_speeds(at(0.5), std::array{900.0, 900.0, 900.0});
+  EXPECT_EQ(thrust.refused_messages(), 5);
+  EXPECT_EQ(thrust.refused_speeds(), 0);
+  thrust.on_speeds(at(1), std::array{kNan, std::numeric_limits<double>::infinity(), 1e9});
+  EXPECT_EQ(thrust.refused_speeds(), 2);  // a rotor that did not report is no mistake
+  thrust.advance(at(1), 0.001);
+  EXPECT_DOUBLE_EQ(thrust.speed_rad_s(0), 500.0);
+}
+
+TEST(RotorThrust, AnInputFromTheFutureIsNone) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  thrust.on_commands(at(10), std::array{0.5, 0.5, 0.5});
+  thrust.advance(at(9.6), 0.001);
+  EXPECT_TRUE(thrust.is_known());
+  thrust.advance(at(9.4), 0.001);
+  EXPECT_FALSE(thrust.is_known());
+}
+
 TEST(RotorThrust, SpinningUpTakesTorque) {
   RotorThrust thrust{vehicle(), InputSource::kCommand};
   thrust.on_commands(at(0), std::array{0.0, 0.0, 0.0});
