@@ -28,7 +28,6 @@ void signal_power_report(benchmark::State& state) {
   for (std::size_t k = 0; k < kSamples; ++k) static_cast<void>(steps.step());
   for ([[maybe_unused]] auto _ : state) {
     benchmark::DoNotOptimize(steps.ekf.isolation());
-    benchmark::DoNotOptimize(steps.ekf.culprits({}));
   }
 }
 BENCHMARK(signal_power_report);
