@@ -38,7 +38,7 @@ SignalPowerParams params_of(const PaperVehicle& vehicle) {
   return params;
 }
 
-// Speeds of the two hundredths that rotors of a real vehicle differ by, and change by within half a second.
+// Forces that wander by a tenth within half a second, so speeds by a twentieth.
 constexpr ModelFlight<4>::Options kCalm{.force_ratio = 0.1, .correlation_s = 0.5, .noise_m_s2 = 0.5};
 constexpr ModelFlight<6>::Options kCalmHexa{.force_ratio = 0.1, .correlation_s = 0.5, .noise_m_s2 = 0.5};
 
