@@ -127,6 +127,8 @@ REMARKS = (
     "- Two rotors of one sense that turn within a band of each other pass for each other until they part. On the six rotors of",
     "  the 1170 g vehicle in a circle at steady speed some never part in the time flown, and no name is given.",
     "- The scale of the speeds is found from about 3 % away. From further off, a strong line may be taken for that of another",
-    "  rotor and the scale be drawn to it. One strong rotor and a scale are ambiguous: see *more*.",
+    "  rotor and the scale be drawn to it: where one rotor alone shakes, a wrong scale and a wrong rotor explain the same.",
     "- A band holds a line to about 2 % of its frequency. Speeds that are wrong for one rotor alone by more than that hide it.",
+    "- The baseline is one healthy flight and counts as exact. What that flight dealt out wrongly between two rotors that turned",
+    "  alike, the next may deal out otherwise: of this come the names of healthy rotors.",
 )
