@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/estimators/unbalance/rotor_bands.h"
 #include "core/estimators/unbalance/signal_power_ekf.h"
 #include "tests/support/reference/dense_signal_power_ekf.h"
 
@@ -20,12 +21,13 @@ inline SignalPowerParams params() {
   SignalPowerParams result;
   result.mass_kg = kMass_kg;
   result.propeller_radius_m = kRadius_m;
+  for (std::size_t i = 0; i < kMaxRotors; ++i) result.bands.spin[i] = i % 2 == 0 ? 1 : -1;
   return result;
 }
 
-template <class Scalar, std::size_t N>
-std::vector<typename SignalPowerEkf<Scalar, N>::Sample> samples() {
-  std::vector<typename SignalPowerEkf<Scalar, N>::Sample> result(kSamples);
+template <class Scalar, std::size_t N, class Bank = FlatBand<Scalar, N>>
+std::vector<typename SignalPowerEkf<Scalar, N, Bank>::Sample> samples() {
+  std::vector<typename SignalPowerEkf<Scalar, N, Bank>::Sample> result(kSamples);
   for (std::size_t k = 0; k < kSamples; ++k) {
     const auto t = static_cast<double>(k);
     result[k].ax_m_s2 = static_cast<Scalar>(2.0 * std::sin(1.7 * t));
@@ -38,12 +40,13 @@ std::vector<typename SignalPowerEkf<Scalar, N>::Sample> samples() {
   return result;
 }
 
-/// The estimator as it flies.
-template <class Scalar, std::size_t N>
+/// The estimator: the source's, or in bands, as it flies.
+template <class Scalar, std::size_t N, class Bank = FlatBand<Scalar, N>>
 struct SignalPowerSteps {
-  std::vector<typename SignalPowerEkf<Scalar, N>::Sample> input = samples<Scalar, N>();
-  SignalPowerEkf<Scalar, N> ekf{params()};
-  typename SignalPowerEkf<Scalar, N>::Innovation innovation;
+  using Ekf = SignalPowerEkf<Scalar, N, Bank>;
+  std::vector<typename Ekf::Sample> input = samples<Scalar, N, Bank>();
+  Ekf ekf{params()};
+  typename Ekf::Innovation innovation;
   std::int64_t taken = 0;
 
   UpdateStatus step() {
@@ -148,6 +151,10 @@ bool with_steps(const std::string_view method, const Run& run) {
     run(SignalPowerSteps<double, N>{});
   } else if (method == "signal_power_float") {
     run(SignalPowerSteps<float, N>{});
+  } else if (method == "rotor_bands_double") {
+    run(SignalPowerSteps<double, N, RotorBands<double, N>>{});
+  } else if (method == "rotor_bands_float") {
+    run(SignalPowerSteps<float, N, RotorBands<float, N>>{});
   } else if (method == "textbook_signal_power") {
     run(TextbookSteps<N>{});
   } else if (method == "signal_power_by_hand") {

@@ -35,13 +35,24 @@ SignalPowerParams power_params(const UnbalanceParams& params) {
   power.initial_tip_mass_mg =
       1e6 * params.usual_m_s2 * UnbalanceMonitor::kg_m_per_m_s2(params) / params.vehicle.propeller_radius_m;
   power.sensor.filter_cutoff_Hz = params.low_pass_Hz;
+  power.expect_nothing();
+  for (std::size_t i = 0; i < params.vehicle.rotor_count; ++i)
+    power.bands.spin[i] = params.vehicle.rotor[i].spin;
   return power;
 }
 
+// What the power is compared with: the same reading of the healthy vehicle, else what order tracking has measured of
+// it, else what is usual. kg·m.
 template <std::size_t N>
-std::array<double, N> first(const std::array<double, kMaxRotors>& all) {
+std::array<double, N> power_baseline(const UnbalanceParams& params) {
+  const auto& power = params.baseline_power;
+  const bool is_learned = std::any_of(power.begin(), power.end(), [](double value) { return value != 0.0; });
   std::array<double, N> result{};
-  std::copy_n(all.begin(), N, result.begin());
+  for (std::size_t i = 0; i < N; ++i) {
+    double amplitude_m_s2 = params.has_baseline ? params.baseline_m_s2[i] : params.usual_m_s2;
+    if (is_learned) amplitude_m_s2 = params.usual_m_s2 * std::sqrt(std::max(0.0, power[i]));
+    result[i] = amplitude_m_s2 * UnbalanceMonitor::kg_m_per_m_s2(params);
+  }
   return result;
 }
 
@@ -72,7 +83,8 @@ RotorUnbalanceMonitor<N>::RotorUnbalanceMonitor(const UnbalanceParams& params) n
                 .speed_noise_ratio = params.speed_noise_ratio,
                 .most_speed_error_ratio = params.most_speed_error_ratio,
                 .low_pass_Hz = params.low_pass_Hz}},
-      fallback_{params.vehicle, power_params(params), first<N>(params.baseline_power)},
+      fallback_{params.vehicle, power_params(params), power_baseline<N>(params),
+                params.smallest_m_s2 * kg_m_per_m_s2(params)},
       life_{life_cycles(params.life_cycle, std::make_index_sequence<N>{})},
       ambiguity_life_{params.life_cycle} {
   for (std::size_t i = 0; i < N; ++i) {
@@ -358,11 +370,9 @@ void RotorUnbalanceMonitor<N>::judge_by_power(TimePoint now, double dt_s) noexce
     rotor.reason = UnbalanceNotJudged::kJudged;
     rotor.amplitude_m_s2 = m_s2_per_kg_m * verdict.unbalance_kg_m[i];
     rotor.sigma_m_s2 = rotor.growth_sigma_m_s2 = m_s2_per_kg_m * verdict.sigma_kg_m[i];
-    rotor.growth_m_s2 =
-        rotor.amplitude_m_s2 - (params_.has_baseline ? params_.baseline_m_s2[i] : params_.usual_m_s2);
+    rotor.growth_m_s2 = m_s2_per_kg_m * verdict.growth_kg_m[i];
     rotor.log_odds = verdict.evidence[i];
-    const bool is_grown =
-        verdict.named == i && rotor.growth_m_s2 - kSigmas * rotor.sigma_m_s2 > params_.smallest_m_s2;
+    const bool is_grown = verdict.is_named[i];
     grown_[i].step(is_grown, now);
     rotor.test_ratio = is_grown || is_known_[i] ? 1.0 : 0.0;
     if (is_grown && !is_known_[i]) rotor.onset = now;

@@ -8,7 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "core/estimators/unbalance/sensor_gain.h"
+#include "core/estimators/unbalance/flat_band.h"
+#include "core/estimators/unbalance/signal_power_params.h"
 #include "core/estimators/update_status.h"
 #include "core/math/cholesky.h"
 #include "core/math/elementary.h"
@@ -16,51 +17,34 @@
 
 namespace airworthy {
 
-/// Defaults are those of the source, for its 690 g and 1170 g vehicles.
-struct SignalPowerParams {
-  static constexpr double kSqrtMinute = 7.7459666924148338;  ///< √60, in √s
-
-  double mass_kg = 0.0;
-  double propeller_radius_m = 0.0;
-  double initial_tip_mass_mg = 20.0;  ///< Δ₀, as a mass at the tip; 2 for the 39 g vehicle
-  double initial_noise_m_s2 = 1.0;    ///< σ₀, per axis
-  double unbalance_sigma = 0.1;       ///< √P₀ of each log unbalance
-  double noise_sigma = 0.05;          ///< √P₀ of the log noise
-  double unbalance_walk_per_sqrt_s = 0.2 / kSqrtMinute;  ///< q_Δ: 20 % in a minute
-  double noise_walk_per_sqrt_s = 0.05 / kSqrtMinute;     ///< q_d: 5 % in a minute
-  double extra_variance_m4_s8 = 100.0;                   ///< r₀: what the model does not know of z
-  double high_pass_Hz = 1.0;
-  SensorGainParams sensor;               ///< not in the source
-  double information_memory_s = 60.0;    ///< time constant of forgetting of the Fisher information
-  double innovation_limit_sigma = 10.0;  ///< innovations beyond it count as this many √S; infinite = no limit
-};
-
-/// Unbalance of every rotor from the power of the horizontal vibration, without knowledge of rotor phases.
+/// Unbalance of every rotor from the power of the horizontal vibration, without knowledge of rotor phases. The bank says
+/// in how many bands: FlatBand, the whole vibration at once, makes it the source's filter; RotorBands tells the rotors
+/// apart by their frequencies.
 ///   State       x = [ln Uᵢ/U₀ (N rotors), ln σ/σ₀];  dx = q·dW                                            (1)
-///   Measurement z = ãx² + ãy², ã = high-pass(a), first order                                              (2)
-///   Model       wᵢ = (fᵢ·Δ₀·e^{xᵢ})²·|G(ωᵢ)|²;  h = E z = Σ wᵢ + 2σ²                                       (3)
-///   Jacobian    Hᵢ = ∂h/∂xᵢ = 2wᵢ;  H_{N+1} = 4σ²                                                          (4)
-///   Noise       R = 4σ⁴ + ΣᵢΣ_{j≠i} wᵢwⱼ + 4σ²·Σ wᵢ + r₀                                                   (5)
-///   Update      P ← P + Q·Δt;  S = H·P·Hᵀ + R;  x ← x + P·Hᵀ·S⁻¹·(z − h);  P ← P − P·Hᵀ·H·P/S              (6)
-///   Information J ← J·e^{−Δt/T} + g·gᵀ/R, of the powers sᵢ = (Uᵢ/U₀)² and (σ/σ₀)²;  g = ∂h/∂s = Hᵢ/(2sᵢ)   (7)
-///   Culprit     the same weighted least squares with one rotor apart:  z ≈ Σⱼ sⱼᵇ·gⱼ + c·Σⱼ gⱼ + pᵢ·gᵢ + n·g_{N+1},
-///               baseline sᵇ known; common change c, noise n and growth pᵢ ≥ 0 free. Evidence: half of what pᵢ takes
-///               off the sum of squares, over the mean square left without it: a log likelihood ratio. Linear in
-///               c, n, pᵢ: it needs neither prior nor convergence                                           (8)
+///   Measurement ã = high-pass(a), first order; of it z, g, n for each band, by the bank. Flat: z = ãx² + ãy²   (2)
+///   Model       wᵢ = gᵢ·e^{2xᵢ};  h = E z = Σ wᵢ + n·σ²;  flat: gᵢ = (fᵢ·Δ₀)²·|G(ωᵢ)|², n = 2                 (3)
+///   Jacobian    Hᵢ = ∂h/∂xᵢ = 2wᵢ;  H_{N+1} = 2nσ²                                                        (4)
+///   Noise       flat: R = 4σ⁴ + ΣᵢΣ_{j≠i} wᵢwⱼ + 4σ²·Σ wᵢ + r₀ = h² − Σ wᵢ² + r₀;  RotorBands: R = h²·τ/Δt + r₀   (5)
+///   Update      P ← P + Q·Δt;  S = H·P·Hᵀ + R;  x ← x + P·Hᵀ·S⁻¹·(z − h);  P ← P − P·Hᵀ·S⁻¹·H·P, all bands at once (6)
+///   Information J ← J·e^{−Δt/T} + Σ_b g·gᵀ/R, of the powers sᵢ = (Uᵢ/U₀)² and (σ/σ₀)²;  g = ∂h/∂s = Hᵢ/(2sᵢ);
+///               least squares of the same weights  s = J⁻¹·b,  b ← b·e^{−Δt/T} + Σ_b g·z/R. RotorBands: R times
+///               max(1, z/h)², both summed over the bands and smoothed                                      (7)
 ///   Source      B. Ghalamchi, Z. Jia, M. W. Mueller, Real-Time Vibration-Based Propeller Fault Diagnosis for
-///               Multicopters; entry in docs/equations/references.md, derivation in docs/equations/unbalance_power.md
+///               Multicopters: (1) to (6), flat; the rest is ours. Entry in docs/equations/references.md, derivation in
+///               docs/equations/unbalance_power.md
 ///   Symbols     Uᵢ → unbalance_kg_m(), mass times radius;  fᵢ = κωᵢ², Δᵢ = Uᵢ/(κm) [m/s² per N],
 ///               so that fᵢΔᵢ = Uᵢωᵢ²/m and κ cancels;  σ → noise_m_s2();
-///               P → p_;  J → information_;  q_Δ, q_d, r₀, σ₀: SignalPowerParams
+///               P → p_;  J → information_;  b → explained_;  q_Δ, q_d, r₀, σ₀: SignalPowerParams
 ///   Deviations  |G|² in (3); a large innovation counts as innovation_limit_sigma·√S, or one knock would move the
 ///               log unbalance by whole units; x is held in [−kLowest, kHighest] and a variance at most 1, beyond which
 ///               the linearised exponential means nothing; all three are counted. Nothing is fused for three time
 ///               constants of the high-pass after the start or a gap
 ///   Errata      docs/equations/errata.md#ghalamchi2020
 ///   Valid for   Δt in (0, kLongestStep_s]; a longer gap restarts the high-pass and fuses nothing. Rotors that beat
-///               slowly against each other make z correlated in time, which (5) does not know: r₀ stands for it
-///   Cost        N + 1 exponentials and about 4·(N + 1)² flops, no heap. Plain loops: the same bits on every machine
-template <class Scalar, std::size_t N>
+///               slowly against each other make z correlated in time, which (5) does not know: r₀, or τ, stands for it
+///   Cost        N + 1 exponentials and about 6·(N + 1)² flops for each band, and the bank's; no heap. Plain loops: the
+///               same bits on every machine
+template <class Scalar, std::size_t N, class Bank = FlatBand<Scalar, N>>
 class SignalPowerEkf {
  public:
   static_assert(N >= 3 && N <= 8);
@@ -68,6 +52,7 @@ class SignalPowerEkf {
   static constexpr double kLongestStep_s = 0.1;
   static constexpr double kLowest = 7.0;   ///< e⁻⁷: a thousandth of U₀
   static constexpr double kHighest = 7.0;  ///< a thousand times U₀
+  static constexpr double kMisfitTime_s = 0.5;
   using Rotors = std::array<Scalar, N>;
   using Vector = std::array<Scalar, kStates>;
   using Matrix = std::array<Vector, kStates>;
@@ -97,29 +82,23 @@ class SignalPowerEkf {
 
   /// What the flight since some memory_s has told about each rotor; see isolation().
   struct Isolation {
+    Rotors
+        power{};  ///< (Uᵢ/U₀)² by least squares: linear, so with neither prior nor convergence; noise may make it negative
     Rotors information{};  ///< 1/(J⁻¹)ᵢᵢ: about sᵢ = (Uᵢ/U₀)², all other rotors and the noise unknown
     Rotors alone{};  ///< Jᵢᵢ: the same if all others were known. information/alone → 0: confounded
     std::array<Rotors, N> correlation{};  ///< of the errors of sᵢ, sⱼ; near −1: one can stand for the other
   };
 
-  /// (8): what speaks for each rotor as the only one that differs from the others, or from the baseline.
-  struct Culprits {
-    Rotors evidence{};        ///< log likelihood ratio; 0 where the rotor would have to shake less
-    Rotors unbalance_kg_m{};  ///< of this rotor if it is the one: baseline, common change and growth
-  };
-
   explicit SignalPowerEkf(const SignalPowerParams& params) noexcept
       : reference_kg_m_{static_cast<Scalar>(1e-6 * params.initial_tip_mass_mg * params.propeller_radius_m)},
         tip_mass_mg_per_kg_m_{static_cast<Scalar>(1e6 / params.propeller_radius_m)},
-        reference_acceleration_{static_cast<Scalar>(1e-6 * params.initial_tip_mass_mg *
-                                                    params.propeller_radius_m / params.mass_kg)},
         reference_noise_m_s2_{static_cast<Scalar>(params.initial_noise_m_s2)},
         extra_variance_{static_cast<Scalar>(params.extra_variance_m4_s8)},
         high_pass_rad_s_{static_cast<Scalar>(2.0 * std::numbers::pi * params.high_pass_Hz)},
         memory_s_{static_cast<Scalar>(params.information_memory_s)},
         innovation_limit_{static_cast<Scalar>(params.innovation_limit_sigma)},
         settling_time_{from_seconds(3.0 / (2.0 * std::numbers::pi * params.high_pass_Hz))},
-        sensor_{params.sensor} {
+        bank_{params} {
     for (std::size_t i = 0; i < kStates; ++i) {
       const bool is_noise = i == N;
       const double sigma = is_noise ? params.noise_sigma : params.unbalance_sigma;
@@ -144,12 +123,30 @@ class SignalPowerEkf {
       restart(sample);
       return UpdateStatus::kConverging;
     }
-    const HighPass passed = high_pass(sample, dt_s);
+    const Phasor<Scalar> passed = high_pass(sample, dt_s);
+    Bank bank = bank_;
+    const typename Bank::Readings readings = bank.step(passed, sample.speed_rad_s, dt_s);
     if (sample.time - settling_since_ < settling_time_) {
-      take(sample, passed);
+      take(sample, passed, bank);
       return UpdateStatus::kConverging;
     }
-    return fuse(sample, passed, dt_s, innovation);
+    const Vector square = squares(x_);
+    Predictions predictions;
+    for (std::size_t b = 0; b < Bank::kBands; ++b) predictions[b] = predict(square, readings[b]);
+    Belief belief{x_, p_, limits_};
+    if (!correct(readings, predictions, dt_s, belief, innovation)) return refuse(UpdateStatus::kNotFinite);
+    inform(readings, predictions, square, dt_s);
+    if (bank.follow(square, readings, dt_s)) {
+      information_ = {};
+      explained_ = {};
+      learned_s_ = 0;
+    }
+    take(sample, passed, bank);
+    x_ = belief.x;
+    p_ = belief.p;
+    limits_ = belief.limits;
+    ++fused_;
+    return UpdateStatus::kFused;
   }
 
   /// Uᵢ, mass times radius.
@@ -169,6 +166,7 @@ class SignalPowerEkf {
   [[nodiscard]] Scalar relative_sigma(std::size_t rotor) const noexcept {
     return std::sqrt(p_[rotor][rotor]);
   }
+  [[nodiscard]] const Bank& bank() const noexcept { return bank_; }
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
   [[nodiscard]] std::int64_t fused() const noexcept { return fused_; }
   [[nodiscard]] std::int64_t refused() const noexcept { return refused_; }
@@ -180,28 +178,34 @@ class SignalPowerEkf {
   [[nodiscard]] Scalar unbalance_sigma_kg_m(Scalar information, Scalar unbalance_kg_m) const noexcept {
     return reference_kg_m_ * reference_kg_m_ / (Scalar{2} * unbalance_kg_m * std::sqrt(information));
   }
-  /// (8). `baseline`: powers() of a healthy flight; zero where there is none. Cost: N + 1 solutions of order 2; for the
-  /// rate of a report.
-  [[nodiscard]] Culprits culprits(const Rotors& baseline) const noexcept;
-  /// sⱼ = (Uⱼ/U₀)² by the least squares of (7), all rotors at once, each within about 1 of their mean (a priori): what
-  /// the flight cannot tell apart stays alike. Negative values are noise. Cost as isolation().
-  [[nodiscard]] Rotors powers() const noexcept;
+  /// For how long J has been learned.
+  [[nodiscard]] Scalar learned_s() const noexcept { return learned_s_; }
   /// J of (7), by rotor and last the noise.
   [[nodiscard]] const Matrix& information() const noexcept { return information_; }
 
-  /// Expected power h, its derivative H and variance R at a state, with e^{2x} at hand for (7).
+  /// Expected power h of a band, its derivative H and variance R.
   struct Prediction {
     Scalar power_m2_s4 = 0;
     Scalar variance_m4_s8 = 0;
     Vector jacobian{};
-    Vector square{};  ///< e^{2x}
   };
-  [[nodiscard]] Prediction predict(const Vector& x, const Rotors& speed_rad_s) const noexcept;
+  /// At a state given by squares().
+  [[nodiscard]] Prediction predict(const Vector& square,
+                                   const BandReading<Scalar, N>& reading) const noexcept;
+  /// e^{2x}: (Uᵢ/U₀)², and last (σ/σ₀)².
+  [[nodiscard]] static Vector squares(const Vector& x) noexcept {
+    Vector result{};
+    for (std::size_t i = 0; i < kStates; ++i) result[i] = exp(Scalar{2} * x[i]);
+    return result;
+  }
 
  private:
-  struct HighPass {
-    Scalar x = 0;
-    Scalar y = 0;
+  using Predictions = std::array<Prediction, Bank::kBands>;
+
+  struct Belief {
+    Vector x{};
+    Matrix p{};
+    Limits limits;
   };
 
   [[nodiscard]] static bool is_finite(const Sample& sample) noexcept {
@@ -218,160 +222,193 @@ class SignalPowerEkf {
   void restart(const Sample& sample) noexcept {
     has_sample_ = true;
     settling_since_ = sample.time;
-    take(sample, {});
+    bank_.restart();
+    take(sample, {}, bank_);
   }
 
   // First order by the exact pole, gain 1 at the Nyquist frequency.
-  [[nodiscard]] HighPass high_pass(const Sample& sample, Scalar dt_s) const noexcept {
+  [[nodiscard]] Phasor<Scalar> high_pass(const Sample& sample, Scalar dt_s) const noexcept {
     const Scalar pole = exp(-high_pass_rad_s_ * dt_s);
     const Scalar gain = static_cast<Scalar>(0.5) * (Scalar{1} + pole);
-    return {pole * passed_.x + gain * (sample.ax_m_s2 - last_.x),
-            pole * passed_.y + gain * (sample.ay_m_s2 - last_.y)};
+    return {pole * passed_.re + gain * (sample.ax_m_s2 - last_.re),
+            pole * passed_.im + gain * (sample.ay_m_s2 - last_.im)};
   }
 
-  void take(const Sample& sample, const HighPass& passed) noexcept {
+  void take(const Sample& sample, const Phasor<Scalar>& passed, const Bank& bank) noexcept {
     time_ = sample.time;
     last_ = {sample.ax_m_s2, sample.ay_m_s2};
     passed_ = passed;
+    bank_ = bank;
   }
 
   void drift(Scalar dt_s) noexcept {  // Q·Δt of (6)
     for (std::size_t i = 0; i < kStates; ++i) p_[i][i] += walk_[i] * dt_s;
-    limit_variances();
+    limit_variances(p_, limits_);
   }
 
-  UpdateStatus fuse(const Sample& sample, const HighPass& passed, Scalar dt_s,
-                    Innovation& innovation) noexcept {
-    const Prediction predicted = predict(x_, sample.speed_rad_s);
+  // (6) for all bands at once: their errors are independent, so one after the other gives the same.
+  [[nodiscard]] bool correct(const typename Bank::Readings& readings, const Predictions& predictions,
+                             Scalar dt_s, Belief& belief, Innovation& innovation) const noexcept {
+    innovation = {};
+    Scalar drift_s = dt_s;
+    for (std::size_t b = 0; b < Bank::kBands; ++b) {
+      const Prediction& predicted = predictions[b];
+      Scalar residual = readings[b].power_m2_s4 - predicted.power_m2_s4;
+      for (std::size_t i = 0; i < kStates; ++i) residual -= predicted.jacobian[i] * (belief.x[i] - x_[i]);
+      if (!correct(predicted, residual, drift_s, belief, innovation)) return false;
+      innovation.power_m2_s4 += readings[b].power_m2_s4;
+      drift_s = 0;
+    }
+    innovation.nis /= static_cast<Scalar>(Bank::kBands);
+    for (Scalar& x : belief.x) {
+      const Scalar held = std::clamp(x, static_cast<Scalar>(-kLowest), static_cast<Scalar>(kHighest));
+      if (held != x) ++belief.limits.state;
+      x = held;
+    }
+    limit_variances(belief.p, belief.limits);
+    return true;
+  }
+
+  [[nodiscard]] bool correct(const Prediction& predicted, Scalar residual, Scalar dt_s, Belief& belief,
+                             Innovation& innovation) const noexcept {
     const Vector& h = predicted.jacobian;
     Vector ph{};
     Scalar s = predicted.variance_m4_s8;
     for (std::size_t i = 0; i < kStates; ++i) {
       Scalar sum{0};
-      for (std::size_t j = 0; j < kStates; ++j) sum += p_[i][j] * h[j];
+      for (std::size_t j = 0; j < kStates; ++j) sum += belief.p[i][j] * h[j];
       ph[i] = sum + walk_[i] * dt_s * h[i];
       s += ph[i] * h[i];
     }
-    const Scalar z = passed.x * passed.x + passed.y * passed.y;
-    innovation.power_m2_s4 = z;
-    innovation.innovation_m2_s4 = z - predicted.power_m2_s4;
-    innovation.variance_m4_s8 = s;
-    innovation.measurement_variance_m4_s8 = predicted.variance_m4_s8;
-    innovation.nis = innovation.innovation_m2_s4 * innovation.innovation_m2_s4 / s;
-    if (!(s > Scalar{0}) || !std::isfinite(innovation.nis)) return refuse(UpdateStatus::kNotFinite);
-    take(sample, passed);
-    correct(ph, s, limited(innovation.innovation_m2_s4, s), dt_s);
-    inform(predicted, z, dt_s);
-    ++fused_;
-    return UpdateStatus::kFused;
-  }
-
-  [[nodiscard]] Scalar limited(Scalar innovation, Scalar s) noexcept {
-    const Scalar most = innovation_limit_ * std::sqrt(s);
-    if (std::abs(innovation) <= most) return innovation;
-    ++limits_.innovation;
-    return std::copysign(most, innovation);
-  }
-
-  void correct(const Vector& ph, Scalar s, Scalar innovation, Scalar dt_s) noexcept {  // (6)
+    const Scalar nis = residual * residual / s;
+    if (!(s > Scalar{0}) || !std::isfinite(nis)) return false;
+    innovation.innovation_m2_s4 += residual;
+    innovation.variance_m4_s8 += s;
+    innovation.measurement_variance_m4_s8 += predicted.variance_m4_s8;
+    innovation.nis += nis;
+    const Scalar limited_residual = limited(residual, s, belief.limits);
     const Scalar inverse = Scalar{1} / s;
     for (std::size_t i = 0; i < kStates; ++i) {
-      x_[i] += ph[i] * inverse * innovation;
-      p_[i][i] += walk_[i] * dt_s;
+      belief.x[i] += ph[i] * inverse * limited_residual;
+      belief.p[i][i] += walk_[i] * dt_s;
       // The product of two numbers does not depend on their order, so P stays symmetric to the bit.
-      for (std::size_t j = 0; j < kStates; ++j) p_[i][j] -= ph[i] * ph[j] * inverse;
+      for (std::size_t j = 0; j < kStates; ++j) belief.p[i][j] -= ph[i] * ph[j] * inverse;
     }
-    for (Scalar& x : x_) {
-      const Scalar held = std::clamp(x, static_cast<Scalar>(-kLowest), static_cast<Scalar>(kHighest));
-      if (held != x) ++limits_.state;
-      x = held;
-    }
-    limit_variances();
+    return true;
   }
 
-  void limit_variances() noexcept {
+  [[nodiscard]] Scalar limited(Scalar residual, Scalar s, Limits& limits) const noexcept {
+    const Scalar most = innovation_limit_ * std::sqrt(s);
+    if (std::abs(residual) <= most) return residual;
+    ++limits.innovation;
+    return std::copysign(most, residual);
+  }
+
+  static void limit_variances(Matrix& p, Limits& limits) noexcept {
     for (std::size_t i = 0; i < kStates; ++i) {
-      if (p_[i][i] <= Scalar{1}) continue;
-      ++limits_.variance;
+      if (p[i][i] <= Scalar{1}) continue;
+      ++limits.variance;
       // Scaling a row and its column keeps P positive definite.
-      const Scalar scale = Scalar{1} / std::sqrt(p_[i][i]);
+      const Scalar scale = Scalar{1} / std::sqrt(p[i][i]);
       for (std::size_t j = 0; j < kStates; ++j) {
-        p_[i][j] *= scale;
-        p_[j][i] = p_[i][j];
+        p[i][j] *= scale;
+        p[j][i] = p[i][j];
       }
-      p_[i][i] = Scalar{1};
+      p[i][i] = Scalar{1};
     }
   }
 
-  void inform(const Prediction& predicted, Scalar z, Scalar dt_s) noexcept {  // (7)
-    const Scalar keep = Scalar{1} / (Scalar{1} + dt_s / memory_s_);           // e^{−Δt/T} to (Δt/T)²/2
-    const Scalar weight = Scalar{1} / predicted.variance_m4_s8;
-    count_ = count_ * keep + Scalar{1};
-    squares_ = squares_ * keep + z * z * weight;
-    Vector g{};
-    for (std::size_t i = 0; i < kStates; ++i)
-      g[i] = predicted.jacobian[i] / (Scalar{2} * predicted.square[i]);
+  void inform(const typename Bank::Readings& readings, const Predictions& predictions, const Vector& square,
+              Scalar dt_s) noexcept {                                // (7)
+    const Scalar keep = Scalar{1} / (Scalar{1} + dt_s / memory_s_);  // e^{−Δt/T} to (Δt/T)²/2
     for (std::size_t i = 0; i < kStates; ++i) {
-      const Scalar weighted = g[i] * weight;
-      explained_[i] = explained_[i] * keep + weighted * z;
-      for (std::size_t j = 0; j < kStates; ++j)
-        information_[i][j] = information_[i][j] * keep + weighted * g[j];
+      explained_[i] *= keep;
+      for (Scalar& element : information_[i]) element *= keep;
     }
+    learned_s_ += dt_s;
+    const Scalar misfit = misfit_of(readings, predictions, dt_s);
+    for (std::size_t b = 0; b < Bank::kBands; ++b) {
+      const Scalar weight = Scalar{1} / (predictions[b].variance_m4_s8 * misfit * misfit);
+      Vector g{};
+      for (std::size_t i = 0; i < kStates; ++i) g[i] = predictions[b].jacobian[i] / (Scalar{2} * square[i]);
+      for (std::size_t i = 0; i < kStates; ++i) {
+        const Scalar weighted = g[i] * weight;
+        explained_[i] += weighted * readings[b].power_m2_s4;
+        for (std::size_t j = 0; j < kStates; ++j) information_[i][j] += weighted * g[j];
+      }
+    }
+  }
+
+  // Where R goes with h² alone, an h too low by far would make the first samples outweigh all that follow.
+  [[nodiscard]] Scalar misfit_of(const typename Bank::Readings& readings, const Predictions& predictions,
+                                 Scalar dt_s) noexcept {
+    if (Bank::kLinesAreSteady) return Scalar{1};
+    Scalar felt{0};
+    Scalar expected{0};
+    for (std::size_t b = 0; b < Bank::kBands; ++b) {
+      felt += readings[b].power_m2_s4;
+      expected += predictions[b].power_m2_s4;
+    }
+    const Scalar share = dt_s / (dt_s + static_cast<Scalar>(kMisfitTime_s));
+    felt_m2_s4_ += share * (felt - felt_m2_s4_);
+    expected_m2_s4_ += share * (expected - expected_m2_s4_);
+    return std::max(Scalar{1}, felt_m2_s4_ / expected_m2_s4_);
   }
 
   Scalar reference_kg_m_;
   Scalar tip_mass_mg_per_kg_m_;
-  Scalar reference_acceleration_;  ///< U₀/m: fᵢ·Δ₀ = reference_acceleration_·ωᵢ², κ cancels
   Scalar reference_noise_m_s2_;
   Scalar extra_variance_;
   Scalar high_pass_rad_s_;
   Scalar memory_s_;
   Scalar innovation_limit_;
   Duration settling_time_;
-  SensorGain<Scalar> sensor_;
   Vector walk_{};  ///< Q: variance per second
 
   bool has_sample_ = false;
   TimePoint time_;
   TimePoint settling_since_;
-  HighPass last_;    ///< unfiltered
-  HighPass passed_;  ///< filtered
+  Phasor<Scalar> last_;    ///< unfiltered
+  Phasor<Scalar> passed_;  ///< filtered
+  Bank bank_;
   Vector x_{};
   Matrix p_{};
   Matrix information_{};
-  // Forgotten as J: Σ g·z/R, Σ z²/R, Σ 1.
-  Vector explained_{};
-  Scalar squares_ = 0;
-  Scalar count_ = 0;
+  Vector explained_{};    ///< Σ g·z/R
+  Scalar learned_s_ = 0;  ///< since J was empty
+  Scalar felt_m2_s4_ = 0;
+  Scalar expected_m2_s4_ = 0;
   Limits limits_;
   std::int64_t fused_ = 0;
   std::int64_t refused_ = 0;
 };
 
-template <class Scalar, std::size_t N>
-typename SignalPowerEkf<Scalar, N>::Prediction SignalPowerEkf<Scalar, N>::predict(
-    const Vector& x, const Rotors& speed_rad_s) const noexcept {
+template <class Scalar, std::size_t N, class Bank>
+typename SignalPowerEkf<Scalar, N, Bank>::Prediction SignalPowerEkf<Scalar, N, Bank>::predict(
+    const Vector& square, const BandReading<Scalar, N>& reading) const noexcept {
   Prediction result;
   Scalar rotors{0};
   Scalar pairs{0};  // Σ_{j<i} wᵢwⱼ: half of the double sum of (5), with nothing to cancel
+  Scalar own{0};    // Σ wᵢ²
   for (std::size_t i = 0; i < N; ++i) {
-    result.square[i] = exp(Scalar{2} * x[i]);
-    const Scalar acceleration = reference_acceleration_ * speed_rad_s[i] * speed_rad_s[i];
-    const Scalar w = acceleration * acceleration * result.square[i] * sensor_.power(speed_rad_s[i]);
+    const Scalar w = reading.gain_m2_s4[i] * square[i];
     pairs += w * rotors;
+    own += w * w;
     rotors += w;
     result.jacobian[i] = Scalar{2} * w;  // (4)
   }
-  result.square[N] = exp(Scalar{2} * x[N]);
-  const Scalar noise = reference_noise_m_s2_ * reference_noise_m_s2_ * result.square[N];
-  result.jacobian[N] = Scalar{4} * noise;
-  result.power_m2_s4 = rotors + Scalar{2} * noise;                                                     // (3)
-  result.variance_m4_s8 = Scalar{4} * noise * (noise + rotors) + Scalar{2} * pairs + extra_variance_;  // (5)
+  const Scalar noise = reading.noise_gain * reference_noise_m_s2_ * reference_noise_m_s2_ * square[N];
+  result.jacobian[N] = Scalar{2} * noise;
+  result.power_m2_s4 = rotors + noise;                                         // (3)
+  Scalar variance = noise * (noise + Scalar{2} * rotors) + Scalar{2} * pairs;  // (5)
+  if constexpr (!Bank::kLinesAreSteady) variance += own;
+  result.variance_m4_s8 = variance / reading.observations + extra_variance_;
   return result;
 }
 
-template <class Scalar, std::size_t N>
-typename SignalPowerEkf<Scalar, N>::Isolation SignalPowerEkf<Scalar, N>::isolation() const noexcept {
+template <class Scalar, std::size_t N, class Bank>
+typename SignalPowerEkf<Scalar, N, Bank>::Isolation SignalPowerEkf<Scalar, N, Bank>::isolation()
+    const noexcept {
   Isolation result;
   BoundedMatrix<Scalar, static_cast<int>(kStates)> j(kStates, kStates);
   BoundedMatrix<Scalar, static_cast<int>(kStates)> inverse;
@@ -394,79 +431,12 @@ typename SignalPowerEkf<Scalar, N>::Isolation SignalPowerEkf<Scalar, N>::isolati
     const auto a = static_cast<Eigen::Index>(i);
     result.alone[i] = information_[i][i];
     result.information[i] = information_[i][i] / inverse(a, a);
+    for (std::size_t k = 0; k < kStates; ++k)
+      result.power[i] += inverse(a, static_cast<Eigen::Index>(k)) * explained_[k] / (unit[i] * unit[k]);
     for (std::size_t k = 0; k < N; ++k) {
       const auto b = static_cast<Eigen::Index>(k);
       result.correlation[i][k] = inverse(a, b) / std::sqrt(inverse(a, a) * inverse(b, b));
     }
-  }
-  return result;
-}
-
-template <class Scalar, std::size_t N>
-typename SignalPowerEkf<Scalar, N>::Rotors SignalPowerEkf<Scalar, N>::powers() const noexcept {
-  using Square = BoundedMatrix<Scalar, static_cast<int>(kStates)>;
-  Square a(kStates, kStates);
-  Square inverse;
-  for (std::size_t i = 0; i < kStates; ++i) {
-    for (std::size_t j = 0; j < kStates; ++j) {
-      // The prior is on the deviations from the mean: I − 1·1ᵀ/N for the rotors, nothing for the noise.
-      Scalar prior{0};
-      if (i < N && j < N) prior = (i == j ? Scalar{1} : Scalar{0}) - Scalar{1} / static_cast<Scalar>(N);
-      a(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = information_[i][j] + prior;
-    }
-  }
-  Rotors result{};
-  if (!invert_positive_definite<Scalar, static_cast<int>(kStates)>(a, inverse)) return result;
-  for (std::size_t i = 0; i < N; ++i) {
-    for (std::size_t j = 0; j < kStates; ++j) {
-      result[i] += inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * explained_[j];
-    }
-  }
-  return result;
-}
-
-template <class Scalar, std::size_t N>
-typename SignalPowerEkf<Scalar, N>::Culprits SignalPowerEkf<Scalar, N>::culprits(
-    const Rotors& baseline) const noexcept {
-  // What the baseline leaves to explain, r, and the normal equations of [common, noise].
-  Vector r = explained_;
-  Rotors with_common{};
-  Scalar common{0};
-  Scalar common_noise{0};
-  Scalar common_r{0};
-  Scalar squares = squares_;
-  for (std::size_t j = 0; j < N; ++j) {
-    for (std::size_t i = 0; i < kStates; ++i) r[i] -= information_[i][j] * baseline[j];
-  }
-  for (std::size_t i = 0; i < N; ++i) {
-    for (std::size_t j = 0; j < N; ++j) with_common[i] += information_[i][j];
-    common += with_common[i];
-    common_noise += information_[i][N];
-    common_r += r[i];
-    squares -= baseline[i] * (explained_[i] + r[i]);
-  }
-  Culprits result;
-  const Scalar noise = information_[N][N];
-  const Scalar determinant = common * noise - common_noise * common_noise;
-  if (!(determinant > Scalar{0})) return result;
-  const auto solve = [&](Scalar a, Scalar b) {
-    return std::array{(noise * a - common_noise * b) / determinant,
-                      (common * b - common_noise * a) / determinant};
-  };
-  const auto without = solve(common_r, r[N]);
-  const Scalar mean_square = (squares - without[0] * common_r - without[1] * r[N]) / count_;
-  if (!(mean_square > Scalar{0})) return result;
-  constexpr Scalar kRounding = Scalar{64} * std::numeric_limits<Scalar>::epsilon();
-  for (std::size_t i = 0; i < N; ++i) {
-    // Rotor i projected off [common, noise]: what is left of its regressor and of r.
-    const auto share = solve(with_common[i], information_[i][N]);
-    const Scalar left = information_[i][i] - with_common[i] * share[0] - information_[i][N] * share[1];
-    const Scalar told = r[i] - with_common[i] * without[0] - information_[i][N] * without[1];
-    if (!(left > kRounding * information_[i][i]) || !(told > Scalar{0})) continue;
-    const Scalar growth = told / left;
-    result.evidence[i] = static_cast<Scalar>(0.5) * told * growth / mean_square;
-    const Scalar power = baseline[i] + without[0] + growth * (Scalar{1} - share[0]);
-    result.unbalance_kg_m[i] = reference_kg_m_ * std::sqrt(std::max(power, Scalar{0}));
   }
   return result;
 }
