@@ -40,8 +40,11 @@ class UnbalanceServiceTest : public ::testing::Test {
     scenario.segments = {{.manoeuvre = sim::Manoeuvre::kGround, .duration_s = 2.0},
                          {.manoeuvre = sim::Manoeuvre::kTakeOff, .duration_s = 4.0, .height_m = 3.0},
                          {.manoeuvre = sim::Manoeuvre::kCircle, .duration_s = 60.0}};
-    scenario.faults = {
-        {.kind = sim::FaultKind::kUnbalance, .onset_s = kOnset_s, .rotor = 4, .magnitude = kDamage_mg}};
+    scenario.faults = {{.kind = sim::FaultKind::kUnbalance,
+                        .onset_s = kOnset_s,
+                        .rotor = 4,
+                        .magnitude = kDamage_mg,
+                        .angle_rad = 0.0}};
     return scenario;
   }
 
@@ -104,6 +107,11 @@ TEST_F(UnbalanceServiceTest, NamesTheRotorThatLostABitOfItsPropeller) {
   EXPECT_THAT(event.summary, HasSubstr("mg at the tip"));
   EXPECT_THAT(event.summary, HasSubstr("not calibrated"));
   for (const fault_event_t& one : events_) EXPECT_EQ(one.component, "rotor 4");
+  EXPECT_NEAR(evidence(3, "tip_mass_growth"), 10.0 * evidence(3, "growth"), 1e-6) << "g·mm at 100 mm";
+  // Not calibrated, so with the propeller's own unbalance.
+  EXPECT_GT(evidence(3, "tip_mass_growth_low"), 0.4 * kDamage_mg);
+  EXPECT_LT(evidence(3, "tip_mass_growth_low"), 0.7 * evidence(3, "tip_mass_growth"));
+  EXPECT_GT(evidence(3, "tip_mass_growth_high"), kDamage_mg);
   ASSERT_EQ(status_.active.size(), 1U);
 }
 
