@@ -60,7 +60,7 @@ void read_policy(ConfigTable table, EffectivenessParams& params) {
   }
 }
 
-void read_calibration(ConfigTable root, bool opens_it, EffectivenessConfig& config) {
+void read_calibration(const ConfigTable& root, bool opens_it, EffectivenessConfig& config) {
   if (!root.has("calibration")) return;
   const auto calibration = rt::named_calibration(root, config.vehicle, opens_it, load_calibration);
   if (!calibration) return;
