@@ -16,6 +16,12 @@ using effectiveness::LossEvent;
 // Time 0 of a flight in vehicle time; any will do.
 constexpr double kStart_s = 100.0;
 
+// The published filter, for any number of rotors: a tenth of a second back to 1 in what it does not see, the reading of
+// a single fault, and more than one report of the speeds must agree.
+constexpr double kPullRatio = 0.02;
+constexpr double kUnexplained = 0.2;
+constexpr Duration kPersistence{12'000};
+
 TimePoint at(double time_s) { return TimePoint{Duration{std::llround((kStart_s + time_s) * 1e6)}}; }
 double seconds(TimePoint time) { return to_seconds(time.time_since_epoch()) - kStart_s; }
 
@@ -61,7 +67,7 @@ class Detectors final : public Output {
         phase_{params.vehicle},
         monitor_{params},
         synchronised_{params.speeds},
-        filter_{params.effectiveness, general(params)},
+        filter_{params.effectiveness, general()},
         outcome_{outcome} {}
 
   void on_truth(const Truth&) override {}
@@ -121,9 +127,9 @@ class Detectors final : public Output {
     note(monitor_.on_commands(at(sample.time_s), span), sample.time_s);
   }
 
-  static LossOfEffectivenessParams<double> general(const effectiveness::EffectivenessParams& params) {
+  static LossOfEffectivenessParams<double> general() {
     LossOfEffectivenessParams<double> result;
-    if (params.vehicle.rotor_count != 4) result.pull_ratio = 0.005;
+    result.pull_ratio = kPullRatio;
     return result;
   }
 
@@ -144,8 +150,10 @@ class Detectors final : public Output {
          monitor_.muted() != effectiveness::Muted::kRotorLost)) {
       return;
     }
-    const auto lost = faithful_lost();
-    if (!lost) return;
+    const auto lost = filter_.single_lost(0.9, kUnexplained);
+    if (lost != suspect_) suspected_since_ = time;
+    suspect_ = lost;
+    if (!lost || time - suspected_since_ < kPersistence) return;
     faithful_done_ = true;
     outcome_.faithful.push_back({*lost,
                                  seconds(time),
@@ -153,14 +161,6 @@ class Detectors final : public Output {
                                  0.0,
                                  effectiveness::LossKind::kPropellerLost,
                                  {}});
-  }
-
-  std::optional<std::size_t> faithful_lost() const {
-    if (rotors_ != 4) return filter_.single_lost(0.9);
-    for (std::size_t i = 0; i < rotors_; ++i) {
-      if (filter_.probability_lost(i) > 0.9) return i;
-    }
-    return std::nullopt;
   }
 
   std::size_t rotors_;
@@ -175,6 +175,8 @@ class Detectors final : public Output {
   std::optional<TimePoint> last_;
   bool was_judging_ = false;
   bool faithful_done_ = false;
+  std::optional<std::size_t> suspect_;
+  TimePoint suspected_since_{};
 };
 
 Scenario plan(const EffectivenessFlight& flight) {

@@ -115,7 +115,11 @@ class RotorLossTest {
     }
     for (std::size_t r = 0; r < kRanges; ++r) {
       for (std::size_t i = 0; i < n_; ++i) {
-        if (i != best.rotor) best.second = std::max(best.second, windows_[r][i].evidence);
+        if (i == best.rotor) continue;
+        // No propeller grows in flight: as a rival of a loss, a gain starts behind by the margin.
+        const bool is_unlikely = ranges_[r].most < Scalar{0} && ranges_[range].most > Scalar{0};
+        best.second =
+            std::max(best.second, windows_[r][i].evidence - (is_unlikely ? params_.margin : Scalar{0}));
       }
     }
     const Window& window = windows_[range][best.rotor];

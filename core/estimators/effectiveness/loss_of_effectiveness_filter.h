@@ -106,8 +106,10 @@ class LossOfEffectivenessFilter {
   }
   /// (6) for every rotor; nothing where P is singular.
   [[nodiscard]] std::optional<std::array<SingleFault, kMost>> single_faults() const noexcept;
-  /// The rotor whose loss alone explains most, if (5) on (6) exceeds `probability` for it.
-  [[nodiscard]] std::optional<std::size_t> single_lost(Scalar probability) const noexcept {
+  /// The rotor whose loss alone explains most, if (5) on (6) exceeds `probability` for it and it leaves no more than the
+  /// share `unexplained` of dᵀP⁻¹d.
+  [[nodiscard]] std::optional<std::size_t> single_lost(Scalar probability,
+                                                       Scalar unexplained = Scalar{1}) const noexcept {
     const auto faults = single_faults();
     if (!faults) return std::nullopt;
     std::size_t best = 0;
@@ -115,6 +117,9 @@ class LossOfEffectivenessFilter {
       if ((*faults)[i].unexplained < (*faults)[best].unexplained) best = i;
     }
     const SingleFault& fault = (*faults)[best];
+    const Scalar loss = Scalar{1} - fault.effectiveness;
+    if (fault.unexplained > unexplained * (fault.unexplained + loss * loss / fault.variance))
+      return std::nullopt;
     if (probability_below(params_.lost_below, fault.effectiveness, fault.variance) > probability) return best;
     return std::nullopt;
   }

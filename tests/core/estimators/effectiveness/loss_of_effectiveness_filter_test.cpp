@@ -194,6 +194,28 @@ TEST(LossOfEffectivenessFilter, NamesEachLostRotorOfAnyVehicle) {
   }
 }
 
+TEST(LossOfEffectivenessFilter, NamesNobodyForWhatOneRotorDoesNotExplain) {
+  const auto matrix = EffectivenessMatrix<double>::of(ring(6));
+  LossOfEffectivenessFilter<double> filter{matrix, general()};
+  Flight flight{matrix, 5};
+  // Two rotors two arms apart: none alone has both moments.
+  const std::vector<double> k{0.0, 1.0, 0.0, 1.0, 1.0, 1.0};
+  int named = 0;
+  for (int i = 0; i < 200; ++i) {
+    static_cast<void>(flight.step(filter, k, 0.005));
+    const auto lost = filter.single_lost(0.9);
+    if (!lost) continue;
+    ++named;
+    const auto fault = (*filter.single_faults())[*lost];
+    const double explained = (1.0 - fault.effectiveness) * (1.0 - fault.effectiveness) / fault.variance;
+    const double share = fault.unexplained / (fault.unexplained + explained);
+    EXPECT_GT(share, 0.01) << i;
+    EXPECT_FALSE(filter.single_lost(0.9, 0.999 * share)) << i;
+    EXPECT_EQ(filter.single_lost(0.9, 1.001 * share), lost) << i;
+  }
+  EXPECT_GT(named, 0);
+}
+
 TEST(LossOfEffectivenessFilter, ReadsWhatIsLeftOfOneRotor) {
   for (const double left : {0.4, 0.7, 1.3}) {
     const auto matrix = EffectivenessMatrix<double>::of(ring(6));
