@@ -484,6 +484,17 @@ std::optional<LossEvent> EffectivenessMonitor::judge(const Inertial& sample, dou
   return decide(motion, now);
 }
 
+bool EffectivenessMonitor::is_silent(std::size_t rotor, TimePoint now) const noexcept {
+  return source_ != SpeedSource::kCommands && speeds_.is_overdue(rotor, now);
+}
+
+bool EffectivenessMonitor::is_any_silent(TimePoint now) const noexcept {
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    if (is_silent(i, now)) return true;
+  }
+  return false;
+}
+
 bool EffectivenessMonitor::is_beyond_ground(const Test::Finding& finding) const noexcept {
   return finding.range == 0 && finding.evidence >= kCautious * test_.threshold();
 }
@@ -499,8 +510,8 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   }
   const Duration age = sample.time - finding->onset;
   if (age < kLeastAge) return std::nullopt;
-  // A rotor that falls silent may stand still: that is for its next report to say.
-  if (source_ != SpeedSource::kCommands && speeds_.is_overdue(finding->rotor, now)) return std::nullopt;
+  // A rotor that falls silent may stand still: that is for its next report to say. A gain of another looks like it.
+  if (is_silent(finding->rotor, now) || (finding->loss < 0.0 && is_any_silent(now))) return std::nullopt;
   LossEvent event;
   event.rotor = finding->rotor;
   event.effectiveness = effectiveness_[event.rotor] * (1.0 - finding->loss);

@@ -194,6 +194,8 @@ class EffectivenessMonitor {
   void start(const Inertial& sample) noexcept;
   void watch_mapping(const Inertial& sample, double dt_s) noexcept;
   [[nodiscard]] MotionSample<double> innovate(const Inertial& sample, double dt_s) noexcept;
+  [[nodiscard]] bool is_silent(std::size_t rotor, TimePoint now) const noexcept;
+  [[nodiscard]] bool is_any_silent(TimePoint now) const noexcept;
   [[nodiscard]] bool is_beyond_ground(const Test::Finding& finding) const noexcept;
   std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
   void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
