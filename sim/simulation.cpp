@@ -141,7 +141,9 @@ Simulation::Simulation(const Multirotor& nominal, const Scenario& scenario, cons
         vehicle.motor_time_constant_s * factor(realism.motor.time_constant_error_ratio, random);
     natural_unbalance_kg_m_[place] = std::abs(random.normal()) * realism.rotor.natural_unbalance_m_s2 *
                                      vehicle.mass_kg / (hover_rad_s * hover_rad_s);
-    rotor.unbalance_phase_rad = random.uniform(0.0, 2.0 * std::numbers::pi);
+    natural_unbalance_phase_rad_[place] = random.uniform(0.0, 2.0 * std::numbers::pi);
+    damage_angle_rad_[place] =
+        Random{seeds.vehicle, "damage angle", place}.uniform(0.0, 2.0 * std::numbers::pi);
     rotor.blade_pass_ratio = realism.rotor.blade_pass_ratio;
     state_.phase_rad[place] = random.uniform(0.0, 2.0 * std::numbers::pi);
     speed_error_.emplace_back(realism.motor.speed_error_ratio, realism.motor.speed_error_time_s,
@@ -266,19 +268,22 @@ void Simulation::drive_motors(const ControlOutput& control) {
     double speed_factor = sag() * (1.0 + speed_error_[place].step(kControlStep_s));
     rotor.time_constant_s = time_constant_s_[place];
     rotor.thrust_ratio = thrust_error_[place];
-    rotor.unbalance_kg_m = natural_unbalance_kg_m_[place];
+    // As seen from the natural unbalance.
+    Eigen::Vector2d unbalance_kg_m{natural_unbalance_kg_m_[place], 0.0};
     rotor.blade_pass_ratio = realism_.rotor.blade_pass_ratio;
     bool is_driven = true;
     for (const Fault& fault : scenario_.faults) {
       if (fault.rotor != number_of_[place] + 1 || !fault.is_active(time_s_)) continue;
       switch (fault.kind) {
-        case FaultKind::kUnbalance:
-          rotor.unbalance_kg_m +=
-              1e-6 * std::max(0.0, fault.magnitude_at(time_s_)) * vehicle.propeller_radius_m;
+        case FaultKind::kUnbalance: {
+          const double angle_rad = fault.angle_rad.value_or(damage_angle_rad_[place]);
+          unbalance_kg_m += 1e-6 * std::max(0.0, fault.magnitude_at(time_s_)) * vehicle.propeller_radius_m *
+                            Eigen::Vector2d{std::cos(angle_rad), std::sin(angle_rad)};
           break;
+        }
         case FaultKind::kPropellerLost:
           rotor.thrust_ratio = 0.0;
-          rotor.unbalance_kg_m = 0.0;
+          unbalance_kg_m.setZero();
           rotor.time_constant_s *= kFreeTimeConstantRatio;
           speed_factor *= kFreeSpeedRatio;
           break;
@@ -303,6 +308,9 @@ void Simulation::drive_motors(const ControlOutput& control) {
           break;
       }
     }
+    rotor.unbalance_kg_m = unbalance_kg_m.norm();
+    rotor.unbalance_phase_rad =
+        natural_unbalance_phase_rad_[place] + std::atan2(unbalance_kg_m.y(), unbalance_kg_m.x());
     const bool is_desynchronised =
         std::any_of(scenario_.faults.begin(), scenario_.faults.end(), [&](const Fault& fault) {
           return fault.kind == FaultKind::kDesync && fault.rotor == number_of_[place] + 1 &&

@@ -48,6 +48,10 @@ class Simulation {
   [[nodiscard]] const State& state() const { return state_; }
   /// Whether any part of the vehicle touches the ground.
   [[nodiscard]] bool has_contact() const { return accelerations_.has_contact; }
+  /// Mass times radius of a propeller as it turns now, natural and by faults. 0-based, as the vehicle file has them.
+  [[nodiscard]] double unbalance_kg_m(std::size_t rotor) const {
+    return inputs_.rotor[place_of_[rotor]].unbalance_kg_m;
+  }
   /// What really flies, rotors in the order of the simulation.
   [[nodiscard]] const Multirotor& vehicle() const { return dynamics_.vehicle(); }
 
@@ -95,6 +99,9 @@ class Simulation {
   std::vector<GaussMarkov> speed_error_;
   std::array<double, kMaxRotors> thrust_error_{};
   std::array<double, kMaxRotors> natural_unbalance_kg_m_{};
+  std::array<double, kMaxRotors> natural_unbalance_phase_rad_{};
+  std::array<double, kMaxRotors>
+      damage_angle_rad_{};  ///< of an unbalance whose angle the scenario leaves open
   std::array<double, kMaxRotors> time_constant_s_{};
   std::array<double, kMaxRotors> stuck_command_{};
   std::array<bool, kMaxRotors> is_stuck_{};

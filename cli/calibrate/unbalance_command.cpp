@@ -59,8 +59,6 @@ void print_summary(const LearnedUnbalance& learned, const UnbalanceParams& param
   const unbalance::Calibration& calibration = learned.calibration;
   UnbalanceParams measured = params;
   measured.response = calibration.response;
-  const double g_mm = 1e6 * UnbalanceMonitor::kg_m_per_m_s2(measured);
-  const double mg = g_mm / params.vehicle.propeller_radius_m;
   fmt::print(
       "{} flights, {:.0f} s judged; telemetry {:.0f} ms late, noise {:.2f} %; motor lag {}; response "
       "{:.2f}{}\n",
@@ -72,13 +70,16 @@ void print_summary(const LearnedUnbalance& learned, const UnbalanceParams& param
       calibration.response,
       calibration.has_trial_mass ? " by trial mass"
                                  : ", not measured: absolute masses may be off by its error");
-  fmt::print("  {:<8} {:>14} {:>12} {:>12} {:>26}\n", "rotor", "baseline m/s^2", "g*mm", "mg at tip",
-             "smallest growth seen, mg");
+  fmt::print("  {:<8} {:>14} {:>12} {:>12} {:>26} {:>14}\n", "rotor", "baseline m/s^2", "g*mm", "mg at tip",
+             "smallest growth seen, mg", "masses within");
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
     const auto& rotor = calibration.rotors[i];
-    fmt::print("  {:<8} {:>6.3f} ± {:<5.3f} {:>12.3g} {:>12.3g} {:>26.3g}\n", i + 1, rotor.baseline_m_s2,
-               rotor.baseline_sigma_m_s2, g_mm * rotor.baseline_m_s2, mg * rotor.baseline_m_s2,
-               mg * learned.smallest_growth_m_s2[i]);
+    const double g_mm = 1e6 * UnbalanceMonitor::kg_m_per_m_s2(measured, i);
+    const double mg = g_mm / params.vehicle.propeller_radius_m;
+    fmt::print("  {:<8} {:>6.3f} ± {:<5.3f} {:>12.3g} {:>12.3g} {:>26.3g} {:>12.0f} %\n", i + 1,
+               rotor.baseline_m_s2, rotor.baseline_sigma_m_s2, g_mm * rotor.baseline_m_s2,
+               mg * rotor.baseline_m_s2, mg * learned.smallest_growth_m_s2[i],
+               200.0 * rotor.response_sigma_ratio);
   }
   for (const std::string& note : learned.notes) fmt::print("note: {}\n", note);
 }

@@ -10,6 +10,7 @@
 #include "cli/calibrate/learning.h"
 #include "cli/calibrate/motor_lag_fit.h"
 #include "cli/eval/flight_run.h"
+#include "core/detectors/unbalance/rigid_body_response.h"
 #include "runtime/bus/channels.h"
 #include "services/unbalance/unbalance_service.h"
 
@@ -171,6 +172,21 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+struct Amplitude {
+  double mean_m_s2 = 0.0;
+  double sigma_m_s2 = 0.0;  ///< of the mean
+};
+
+/// Of judgements whose errors last for some 2 s.
+Amplitude amplitude_of(const std::vector<double>& judged) {
+  const double centre = mean(judged);
+  double variance = 0.0;
+  for (const double one : judged)
+    variance += (one - centre) * (one - centre) / static_cast<double>(judged.size());
+  const double independent = static_cast<double>(judged.size()) * to_seconds(UnbalanceMonitor::kPeriod) / 2.0;
+  return {centre, std::sqrt(variance / std::max(1.0, independent))};
+}
+
 /// (2), the median over the rotors; empty without enough reports.
 std::optional<double> speed_noise(const std::vector<FlightRecord>& flights) {
   std::vector<double> ratios;
@@ -281,17 +297,49 @@ rt::Expected<double> best_latency(const std::vector<std::string>& logs, Unbalanc
   return best_s;
 }
 
-/// (4) for the trials of one rotor: acceleration that the trial mass made.
-double trial_amplitude(const std::vector<double>& seen_m_s2, double baseline_m_s2) {
-  if (seen_m_s2.size() == 1) return seen_m_s2.front() - baseline_m_s2;
-  double power = 0.0;
-  for (const double seen : seen_m_s2) power += seen * seen / static_cast<double>(seen_m_s2.size());
-  return std::sqrt(std::max(0.0, power - baseline_m_s2 * baseline_m_s2));
+/// What the trials of one rotor with one mass say.
+struct Trials {
+  std::size_t rotor = 0;
+  double response = 0.0;
+  double sigma_ratio = 0.0;  ///< 1σ of it, of itself
+};
+
+/// (4) for the amplitudes of one rotor with the mass on either blade.
+Trials response_of(std::size_t rotor, double moment_kg_m, const std::vector<Amplitude>& seen,
+                   double baseline_m_s2, const UnbalanceParams& params) {
+  double power = -baseline_m_s2 * baseline_m_s2;
+  double variance = 0.0;
+  for (const Amplitude& one : seen) {
+    const auto count = static_cast<double>(seen.size());
+    power += one.mean_m_s2 * one.mean_m_s2 / count;
+    variance += one.sigma_m_s2 * one.sigma_m_s2 / (count * count);
+  }
+  const double made = std::sqrt(std::max(0.0, power));
+  // √(b² + m² + 2·b·m·cos φ) of a single trial: φ may be anything.
+  if (seen.size() == 1) variance += 0.5 * baseline_m_s2 * baseline_m_s2;
+  const double kg_m = UnbalanceMonitor::kg_m_per_m_s2(params, rotor);
+  return {rotor, params.response * made * kg_m / moment_kg_m, std::sqrt(variance) / std::max(made, 1e-6)};
+}
+
+/// Of the response to a mass on `rotor`: by the trial that says most of it, or where several rotors were tried by how
+/// little these agree.
+double response_sigma(const std::vector<Trials>& trials, std::size_t rotor, double response,
+                      const Multirotor& vehicle, double against_ratio) {
+  double least = 1.0;
+  double spread = 0.0;
+  for (const Trials& one : trials) {
+    const double transfer = response_transfer_sigma(vehicle, one.rotor, rotor, against_ratio);
+    const double off = one.response / response - 1.0;
+    least = std::min(least, std::hypot(one.sigma_ratio, transfer));
+    spread += off * off / static_cast<double>(trials.size());
+  }
+  return std::max(least, std::sqrt(spread));
 }
 
 rt::Expected<void> learn_response(const std::vector<TrialFlight>& trials, const UnbalanceConfig& config,
                                   LearnedUnbalance& learned) {
-  std::map<std::pair<int, double>, std::vector<double>> seen;
+  unbalance::Calibration& calibration = learned.calibration;
+  std::map<std::pair<int, double>, std::vector<Amplitude>> seen;
   for (const TrialFlight& trial : trials) {
     const auto flight = read_flight(trial.log, config, true);
     if (!flight) return tl::unexpected<rt::Error>{flight.error()};
@@ -300,29 +348,33 @@ rt::Expected<void> learn_response(const std::vector<TrialFlight>& trials, const 
       return rt::fail_with(
           fmt::format("{}: rotor {} could not be judged for {:g} s", trial.log, trial.rotor, kLeastJudged_s));
     }
-    seen[{trial.rotor, trial.tip_mass_mg}].push_back(median(amplitudes));
+    seen[{trial.rotor, trial.tip_mass_mg}].push_back(amplitude_of(amplitudes));
   }
+  std::vector<Trials> measured;
   std::vector<double> responses;
   for (const auto& [trial, amplitudes] : seen) {
-    const auto& [rotor, tip_mass_mg] = trial;
-    const double made = trial_amplitude(
-        amplitudes, learned.calibration.rotors[static_cast<std::size_t>(rotor - 1)].baseline_m_s2);
+    const auto& [number, tip_mass_mg] = trial;
+    const auto rotor = static_cast<std::size_t>(number - 1);
     const double moment_kg_m = 1e-6 * tip_mass_mg * config.monitor.vehicle.propeller_radius_m;
-    responses.push_back(config.monitor.response * made * UnbalanceMonitor::kg_m_per_m_s2(config.monitor) /
-                        moment_kg_m);
+    measured.push_back(
+        response_of(rotor, moment_kg_m, amplitudes, calibration.rotors[rotor].baseline_m_s2, config.monitor));
+    responses.push_back(measured.back().response);
     if (amplitudes.size() == 1) {
-      learned.notes.push_back(
-          fmt::format("rotor {}: one trial only; fly again with the mass on the other blade, or its phase "
-                      "against the natural "
-                      "unbalance is guessed",
-                      rotor));
+      learned.notes.push_back(fmt::format(
+          "rotor {}: one trial only; fly again with the mass on the other blade: its phase against the "
+          "natural unbalance is not known, which makes the response uncertain by {:.0f} %",
+          number, 100.0 * measured.back().sigma_ratio));
     }
   }
   const double response = median(responses);
   if (!(response > 0.0))
     return rt::fail_with("the trial mass made no vibration: is it on the rotor that was named?");
-  learned.calibration.response = response;
-  learned.calibration.has_trial_mass = true;
+  calibration.response = response;
+  calibration.has_trial_mass = true;
+  for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
+    calibration.rotors[i].response_sigma_ratio =
+        response_sigma(measured, i, response, config.monitor.vehicle, calibration.against_ratio);
+  }
   return {};
 }
 
@@ -381,8 +433,9 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
     for (const FlightRecord& flight : *flights) {
       filter_power += flight.powers[i] / static_cast<double>(flights->size());
     }
-    calibration.rotors.push_back(
-        {baseline, std::sqrt(variance), filter_power, tuned.monitor.speed_error_ratio[i]});
+    calibration.rotors.push_back({baseline, std::sqrt(variance), filter_power,
+                                  tuned.monitor.speed_error_ratio[i],
+                                  config.monitor.response_sigma_ratio[i]});
     learned.smallest_growth_m_s2.push_back(config.monitor.smallest_m_s2 +
                                            kSigmas * std::hypot(median(all.sigma_m_s2), std::sqrt(variance)));
     for (const double a : all.amplitude_m_s2) power += a * a;

@@ -33,9 +33,10 @@ inline constexpr double kLeastJudged_s = 20.0;
 ///   Clocks     of the motor controllers: where SpeedScale ends, median over the flights
 ///   Motor lag  median over the flights of fit_motor_lag(), for the time without rotor speeds
 ///   Baseline   mean amplitude of each rotor; sigma: of single judgements around it, flights pooled              (3)
-///   Response   a trial mass m at radius r makes response·m·r·ω₀²/M. Two trials, the mass once on either blade of the
-///              rotor: its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b. One trial: a − b, right
-///              only where the mass adds to the baseline                                                       (4)
+///   Response   a trial mass m at radius r makes response·G·m·r·ω₀²/M, G of rigid_body_response.h. Of trials with the
+///              mass once on either blade its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b; of one
+///              trial it is a² − b² on average over that phase. Sigma of each rotor: of the trial's amplitudes (for one
+///              trial b/√2 as well), and of carrying it from the rotor of the trial to this one                    (4)
 /// Refuses logs of other vehicles, too little judged flight, and rotors that were never judged, with the reason.
 [[nodiscard]] rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& logs,
                                                              const std::vector<TrialFlight>& trials,

@@ -28,6 +28,7 @@ struct Options {
   std::string scenario_path;
   std::vector<std::string> overrides;
   sim::Level level = sim::Level::kHard;
+  bool rotors_alike = false;
   std::uint64_t seed = 1;
   std::optional<std::uint64_t> vehicle_seed;
   double duration_s = 0.0;
@@ -95,6 +96,7 @@ rt::Expected<sim_command::Flight> read_flight(const Options& options) {
                              sim::Realism::at(options.level),
                              {options.vehicle_seed.value_or(options.seed), options.seed},
                              options.duration_s};
+  if (options.rotors_alike) flight.realism = flight.realism.with_rotors_alike();
   if (flight.duration_s <= 0.0) flight.duration_s = flight.scenario.duration_s();
   if (options.imu_average_ms > 0.0) {
     flight.realism.imu.averaging_window_s = options.imu_average_ms * 1e-3;
@@ -154,6 +156,10 @@ int run(int argc, char** argv) {
   app.add_option("--level", options.level, "realism: nominal, hard or brutal; default hard")
       ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Level>{
           {"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}}));
+  app.add_flag(
+      "--rotors-alike", options.rotors_alike,
+      "no wind, motors and propellers without differences, mass in the middle: in a hover all rotors turn "
+      "at one speed");
   app.add_option("--seed", options.seed, "of all random numbers; default 1")->check(CLI::NonNegativeNumber);
   app.add_option(
          "--vehicle-seed", options.vehicle_seed,

@@ -34,7 +34,8 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
     calibration.rotors.push_back({rotor.required<double>("baseline_m_s2", kAmplitude),
                                   rotor.required<double>("baseline_sigma_m_s2", kAmplitude),
                                   rotor.optional<double>("power", 0.0, Range{-1e6, 1e6}),
-                                  rotor.optional<double>("speed_error_ratio", 0.0, Range{-0.1, 0.1})});
+                                  rotor.optional<double>("speed_error_ratio", 0.0, Range{-0.1, 0.1}),
+                                  rotor.optional<double>("response_sigma_ratio", 0.25, Range{0.0, 10.0})});
   }
   calibration.hash = file.hash();
   return file.finish(std::move(calibration));
@@ -69,6 +70,7 @@ rt::Expected<UnbalanceParams> with_calibration(UnbalanceParams params, const Cal
     params.baseline_m_s2[i] = calibration.rotors[i].baseline_m_s2;
     params.baseline_sigma_m_s2[i] = calibration.rotors[i].baseline_sigma_m_s2;
     params.speed_error_ratio[i] = calibration.rotors[i].speed_error_ratio;
+    params.response_sigma_ratio[i] = calibration.rotors[i].response_sigma_ratio;
     params.baseline_power[i] = calibration.rotors[i].power / (ratio * ratio);
   }
   return params;
@@ -87,7 +89,7 @@ std::string to_toml(const Calibration& calibration) {
       "speed_latency_s = {:.6g}            # of the telemetry of the rotor speeds\n"
       "speed_noise_ratio = {:.6g}          # of one report\n"
       "motor_time_constant_s = {:.6g}     # command to speed; 0 = not learned\n"
-      "response = {:.6g}                   # acceleration felt / force over mass, mean of x and y\n"
+      "response = {:.6g}                   # acceleration felt / that of a rigid body, mean of x and y\n"
       "response_measured = {}          # by a flight with a trial mass; false: as the vehicle file assumes\n"
       "against_ratio = {:.6g}              # part of the vibration that turns against the rotor\n",
       calibration.vehicle, calibration.flights, calibration.judged_s, calibration.accel_low_pass_Hz,
@@ -97,8 +99,9 @@ std::string to_toml(const Calibration& calibration) {
     const Calibration::Rotor& rotor = calibration.rotors[i];
     text += fmt::format(
         "\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\npower = {:.6g}\n"
-        "speed_error_ratio = {:.6g}\n",
-        i + 1, rotor.baseline_m_s2, rotor.baseline_sigma_m_s2, rotor.power, rotor.speed_error_ratio);
+        "speed_error_ratio = {:.6g}\nresponse_sigma_ratio = {:.6g}\n",
+        i + 1, rotor.baseline_m_s2, rotor.baseline_sigma_m_s2, rotor.power, rotor.speed_error_ratio,
+        rotor.response_sigma_ratio);
   }
   return text;
 }

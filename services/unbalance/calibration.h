@@ -15,10 +15,11 @@ inline constexpr double kCalibratedSpeedError = 0.002;
 /// `airworthy calibrate unbalance` writes it, airworthy-unbalance reads it.
 struct Calibration {
   struct Rotor {
-    double baseline_m_s2 = 0.0;        ///< amplitude at hover speed, mean over the flights
-    double baseline_sigma_m_s2 = 0.0;  ///< of a single judgement around it, between flights included
-    double power = 0.0;                ///< of the signal-power filter, (U/U₀)²; 0 = not learned
-    double speed_error_ratio = 0.0;    ///< true over reported speed, less 1
+    double baseline_m_s2 = 0.0;          ///< amplitude at hover speed, mean over the flights
+    double baseline_sigma_m_s2 = 0.0;    ///< of a single judgement around it, between flights included
+    double power = 0.0;                  ///< of the signal-power filter, (U/U₀)²; 0 = not learned
+    double speed_error_ratio = 0.0;      ///< true over reported speed, less 1
+    double response_sigma_ratio = 0.25;  ///< 1σ of what a mass on this rotor makes, of itself
   };
 
   std::string vehicle;
@@ -29,7 +30,8 @@ struct Calibration {
   double speed_latency_s = 0.0;
   double speed_noise_ratio = 0.0;
   double motor_time_constant_s = 0.0;  ///< 0 = not learned
-  double response = 1.0;  ///< acceleration felt / force over mass; by a trial mass, else of the vehicle file
+  double response =
+      1.0;  ///< acceleration felt / that of a rigid body; by a trial mass, else of the vehicle file
   bool has_trial_mass = false;  ///< whether `response` was measured
   double against_ratio = 0.3;
   std::vector<Rotor> rotors;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <numbers>
 
 #include "core/detectors/unbalance/rotor_unbalance_monitor.h"
@@ -47,8 +48,7 @@ std::unique_ptr<UnbalanceMonitor> make_monitor(const UnbalanceParams& params) {
 UnbalanceService::UnbalanceService(rt::Node& node, const UnbalanceConfig& config)
     : node_{node},
       config_{config},
-      g_mm_per_m_s2_{kGMm_per_kg_m * UnbalanceMonitor::kg_m_per_m_s2(config.monitor)},
-      mg_per_g_mm_{1.0 / config.monitor.vehicle.propeller_radius_m},
+      mg_per_kg_m_{kGMm_per_kg_m / config.monitor.vehicle.propeller_radius_m},
       phase_{node, config.monitor.vehicle},
       monitor_{make_monitor(config.monitor)},
       reporter_{node, "unbalance", [this] { return report(); }} {
@@ -89,15 +89,19 @@ void UnbalanceService::report_all() {
   report_ambiguity();
 }
 
-std::vector<evidence_t> UnbalanceService::evidence_of(const RotorUnbalance& rotor) const {
+std::vector<evidence_t> UnbalanceService::evidence_of(std::size_t index, const RotorUnbalance& rotor) const {
   using rt::evidence;
   const UnbalanceInnovation innovation = monitor_->innovation();
   const double sigma = rotor.sigma_m_s2;
-  return {evidence("unbalance", g_mm_per_m_s2_ * rotor.amplitude_m_s2, "g*mm"),
-          evidence("unbalance_sigma", g_mm_per_m_s2_ * sigma, "g*mm"),
-          evidence("growth", g_mm_per_m_s2_ * rotor.growth_m_s2, "g*mm"),
-          evidence("growth_sigma", g_mm_per_m_s2_ * rotor.growth_sigma_m_s2, "g*mm"),
-          evidence("tip_mass_growth", mg_per_g_mm_ * g_mm_per_m_s2_ * rotor.growth_m_s2, "mg"),
+  const double g_mm_per_m_s2 = kGMm_per_kg_m * UnbalanceMonitor::kg_m_per_m_s2(config_.monitor, index);
+  const UnbalanceReading& reading = rotor.reading;
+  return {evidence("unbalance", g_mm_per_m_s2 * rotor.amplitude_m_s2, "g*mm"),
+          evidence("unbalance_sigma", g_mm_per_m_s2 * sigma, "g*mm"),
+          evidence("growth", kGMm_per_kg_m * reading.growth_kg_m, "g*mm"),
+          evidence("growth_sigma", kGMm_per_kg_m * reading.sigma_kg_m, "g*mm"),
+          evidence("tip_mass_growth", mg_per_kg_m_ * reading.growth_kg_m, "mg"),
+          evidence("tip_mass_growth_low", mg_per_kg_m_ * reading.low_kg_m, "mg"),
+          evidence("tip_mass_growth_high", mg_per_kg_m_ * reading.high_kg_m, "mg"),
           evidence("amplitude", rotor.amplitude_m_s2, "m/s^2"),
           evidence("information", sigma > 0.0 ? 1.0 / (sigma * sigma) : 0.0, "s^4/m^2"),
           evidence("by_signal_power", rotor.by_power ? 1.0 : 0.0, "1"),
@@ -109,21 +113,22 @@ std::vector<evidence_t> UnbalanceService::evidence_of(const RotorUnbalance& roto
 
 void UnbalanceService::report_rotor(std::size_t index, const RotorUnbalance& rotor) {
   if (rotor.transition == FaultLifeCycle::Transition::kNone) return;
-  const double growth = g_mm_per_m_s2_ * rotor.growth_m_s2;
-  const double sigma = g_mm_per_m_s2_ * rotor.growth_sigma_m_s2;
+  const double growth = kGMm_per_kg_m * rotor.reading.growth_kg_m;
   rt::Fault fault;
   fault.component = rotor_name(index);
   fault.fault_kind = "unbalance";
   fault.severity =
       rotor.growth_m_s2 > config_.monitor.caution_m_s2 ? rt::Severity::kCaution : rt::Severity::kAdvisory;
   fault.magnitude = growth;
-  fault.magnitude_sigma = sigma;
+  fault.magnitude_sigma = kGMm_per_kg_m * rotor.reading.sigma_kg_m;
   fault.magnitude_unit = "g*mm";
   fault.onset = rotor.onset;
-  fault.summary =
-      fmt::format("out of balance by {:.2g} g*mm ({:.3g} mg at the tip){}", growth, mg_per_g_mm_ * growth,
-                  config_.monitor.has_baseline ? " more than calibrated" : "; not calibrated");
-  fault.evidence = evidence_of(rotor);
+  fault.summary = fmt::format("out of balance by {:.2g} g*mm ({:.3g} mg at the tip, {:.2g} to {:.2g}){}",
+                              growth, mg_per_kg_m_ * rotor.reading.growth_kg_m,
+                              mg_per_kg_m_ * std::max(0.0, rotor.reading.low_kg_m),
+                              mg_per_kg_m_ * rotor.reading.high_kg_m,
+                              config_.monitor.has_baseline ? " more than calibrated" : "; not calibrated");
+  fault.evidence = evidence_of(index, rotor);
   reporter_.report(index, rotor.transition, monitor_->judged_at(), fault);
 }
 
@@ -171,7 +176,7 @@ rt::DetectorReport UnbalanceService::report() const {
   for (std::size_t i = 0; i < rotors.size(); ++i) {
     const std::string reason =
         report.state == DetectorState::kInitialising ? "no inertial data yet" : reason_of(rotors[i]);
-    report.components.push_back(rt::assessment(rotor_name(i), reason, evidence_of(rotors[i])));
+    report.components.push_back(rt::assessment(rotor_name(i), reason, evidence_of(i, rotors[i])));
   }
   const UnbalanceInnovation innovation = monitor_->innovation();
   node_.counters()["samples_fused"] = innovation.samples;

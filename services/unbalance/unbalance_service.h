@@ -36,12 +36,11 @@ class UnbalanceService {
   void report_ambiguity();
   [[nodiscard]] rt::DetectorReport report() const;
   [[nodiscard]] std::string reason_of(const RotorUnbalance& rotor) const;
-  [[nodiscard]] std::vector<evidence_t> evidence_of(const RotorUnbalance& rotor) const;
+  [[nodiscard]] std::vector<evidence_t> evidence_of(std::size_t index, const RotorUnbalance& rotor) const;
 
   rt::Node& node_;
   const UnbalanceConfig& config_;
-  double g_mm_per_m_s2_;
-  double mg_per_g_mm_;
+  double mg_per_kg_m_;  ///< at the tip, of a mass times radius
   rt::FlightPhaseInput phase_;
   std::unique_ptr<UnbalanceMonitor> monitor_;
   double window_s_ = 0.0;

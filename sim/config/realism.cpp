@@ -124,4 +124,20 @@ Realism Realism::at(Level level) {
   return *realism;
 }
 
+Realism Realism::with_rotors_alike() const {
+  Realism alike = *this;
+  alike.motor.speed_error_ratio = 0.0;
+  alike.motor.time_constant_error_ratio = 0.0;
+  alike.rotor.thrust_error_ratio = 0.0;
+  alike.airframe.centre_of_mass_m_per_m = 0.0;
+  alike.airframe.thrust_axis_error_rad = 0.0;
+  alike.wind.mean_m_s = 0.0;
+  alike.imu.gyro_bias_rad_s = 0.0;
+  alike.imu.gyro_drift_rad_s = 0.0;
+  alike.autopilot.attitude_noise_rad = 0.0;
+  alike.autopilot.position_noise_m = 0.0;
+  alike.autopilot.velocity_noise_m_s = 0.0;
+  return alike;
+}
+
 }  // namespace airworthy::sim

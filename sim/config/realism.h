@@ -81,6 +81,10 @@ struct Realism {
                                                   Level level);
   /// The table of this program.
   [[nodiscard]] static Realism at(Level level);
+  /// The same, with nothing that makes one rotor turn faster than another in a hover: motors and propellers alike, no wind,
+  /// the centre of mass in the middle, an estimate without errors. Noise of the sensors, telemetry, mass, response of the
+  /// airframe and unbalance of the propellers stay.
+  [[nodiscard]] Realism with_rotors_alike() const;
 };
 
 /// The text of sim/realism.toml.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <string_view>
@@ -65,7 +66,7 @@ std::optional<FaultKind> read_kind(rt::ConfigTable table) {
 
 // What an unknown kind may be written with is not known: none of it is worth a complaint.
 void pass_over(rt::ConfigTable table) {
-  for (const std::string_view key : {"onset_s", "end_s", "rotor"}) {
+  for (const std::string_view key : {"onset_s", "end_s", "rotor", "angle_deg"}) {
     static_cast<void>(table.if_present<double>(key));
   }
   for (const std::string_view key : {"axis", "link"}) static_cast<void>(table.if_present<std::string>(key));
@@ -106,6 +107,11 @@ Fault read_fault(rt::ConfigTable table, std::size_t rotor_count) {
     case Subject::kLink:
       fault.link = table.choice<Link>("link", {{"esc", Link::kEsc}, {"autopilot", Link::kAutopilot}});
       break;
+  }
+  if (fault.kind == FaultKind::kUnbalance) {
+    if (const auto angle_deg = table.if_present<double>("angle_deg", rt::Range{-360.0, 360.0})) {
+      fault.angle_rad = *angle_deg * std::numbers::pi / 180.0;
+    }
   }
   const bool grows = !entry.growth_key.empty();
   if (!entry.magnitude_key.empty()) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,8 @@ struct Fault {
   int axis = 0;            ///< of a sensor: 0 x, 1 y, 2 z; a frozen one is so in all
   double magnitude = 0.0;  ///< in the unit of its kind
   double growth_per_s = 0.0;
+  /// Of an unbalance, from the propeller's natural one in its sense of rotation; empty: drawn from the vehicle seed.
+  std::optional<double> angle_rad{};
   Link link = Link::kNone;
 
   [[nodiscard]] bool is_active(double time_s) const { return time_s >= onset_s && time_s < end_s; }

@@ -1,12 +1,16 @@
 // Simulated flights of damaged and healthy vehicles at hard realism, judged by the unbalance monitor with a calibration of
 // the same vehicle from other flights. Prints one line of values for each flight; tools/evidence makes the page of them.
-// Usage: unbalance_isolation CONDITION VEHICLE MANOEUVRE FIRST_SEED COUNT
+// Usage: unbalance_isolation VEHICLE SEED CONDITION:MANOEUVRE...
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 
+#include "core/detectors/unbalance/rigid_body_response.h"
 #include "runtime/config/vehicle.h"
 #include "tests/support/unbalance_flight_judge.h"
 
@@ -17,7 +21,8 @@ constexpr double kGround_s = 2.0;
 constexpr double kTakeOff_s = 4.0;
 constexpr double kCalibration_s = 60.0;
 constexpr double kTrial_s = 40.0;
-constexpr double kTrialTimes = 5.0;  // the damage
+constexpr double kTrialTimes = 5.0;   // the damage
+constexpr double kTrialSigma = 0.02;  // of the amplitude of two trials, of itself
 
 struct Vehicle {
   const char* name;
@@ -37,10 +42,13 @@ struct Condition {
   double esc_rate_Hz = -1.0;
   double esc_resolution_rpm = -1.0;
   bool averaged = false;
-  bool still = false;  ///< no wind, no errors of motors, rotors and airframe
+  bool still = false;  ///< no wind, no errors of motors, rotors and thrust axes; those of the autopilot stay
+  bool alike = false;  ///< Realism::with_rotors_alike()
+  double damage_times = 1.0;
   bool has_trial = false;
   bool has_speeds = true;
   double flight_s = 40.0;
+  std::optional<double> angle_rad{};  ///< of the damage, from the natural unbalance; empty: any
 };
 constexpr std::array kConditions{
     Condition{.name = "healthy", .is_damaged = false},
@@ -55,13 +63,24 @@ constexpr std::array kConditions{
     Condition{.name = "slow_coarse", .esc_rate_Hz = 50.0, .esc_resolution_rpm = 100.0},
     Condition{.name = "averaged_200Hz", .averaged = true},
     Condition{.name = "averaged_200Hz_healthy", .is_damaged = false, .averaged = true},
+    Condition{.name = "averaged_200Hz_x3", .averaged = true, .damage_times = 3.0},
     Condition{.name = "still_air", .still = true},
-    Condition{.name = "no_speeds", .has_speeds = false, .flight_s = 120.0},
+    Condition{.name = "rotors_alike", .alike = true},
+    Condition{.name = "rotors_alike_x5", .alike = true, .damage_times = 5.0},
+    Condition{.name = "no_speeds", .has_speeds = false, .flight_s = 120.0, .angle_rad = 0.0},
     Condition{.name = "no_speeds_healthy", .is_damaged = false, .has_speeds = false, .flight_s = 120.0},
     Condition{.name = "hours", .is_damaged = false, .flight_s = 600.0},
 };
 
-Realism realism_of(const Condition& condition) {
+/// What a calibration depends on.
+using Link = std::tuple<double, double, double, double, double, bool>;
+Link link_of(const Condition& condition) {
+  return {condition.mass_factor, condition.esc_latency_s,      condition.esc_dropout_ratio,
+          condition.esc_rate_Hz, condition.esc_resolution_rpm, condition.averaged};
+}
+
+/// Of the air in which a vehicle is calibrated; its links are those of the condition.
+Realism calibration_realism_of(const Condition& condition) {
   Realism realism = Realism::at(Level::kHard);
   if (condition.esc_latency_s >= 0.0) realism.esc.latency_s = condition.esc_latency_s;
   if (condition.esc_dropout_ratio >= 0.0) realism.esc.dropout_ratio = condition.esc_dropout_ratio;
@@ -71,6 +90,12 @@ Realism realism_of(const Condition& condition) {
     realism.imu.rate_Hz = 200.0;
     realism.imu.averaging_window_s = 0.005;
   }
+  return realism;
+}
+
+Realism realism_of(const Condition& condition) {
+  Realism realism = calibration_realism_of(condition);
+  if (condition.alike) return realism.with_rotors_alike();
   if (condition.still) {
     realism.wind.mean_m_s = 0.0;
     realism.motor.speed_error_ratio = 0.0;
@@ -93,18 +118,31 @@ Scenario plan(Manoeuvre manoeuvre, double flight_s, double interval_s) {
 }
 
 template <std::size_t N>
-UnbalanceFlightJudge<N> flown(const Multirotor& vehicle, const Scenario& scenario, const Realism& realism,
-                              Seeds seeds, const UnbalanceParams& params, bool has_speeds) {
-  UnbalanceFlightJudge<N> judge{params, has_speeds};
+struct Flown {
+  UnbalanceFlightJudge<N> judge;
+  std::array<double, N> unbalance_kg_m{};  ///< of each propeller at the end, in truth
+};
+
+template <std::size_t N>
+Flown<N> flown(const Multirotor& vehicle, const Scenario& scenario, const Realism& realism, Seeds seeds,
+               const UnbalanceParams& params, bool has_speeds) {
+  Flown<N> flight{UnbalanceFlightJudge<N>{params, has_speeds}};
   Simulation simulation{vehicle, scenario, realism, seeds};
-  while (simulation.time_s() < scenario.duration_s()) simulation.step(judge);
-  return judge;
+  while (simulation.time_s() < scenario.duration_s()) simulation.step(flight.judge);
+  for (std::size_t i = 0; i < N; ++i) flight.unbalance_kg_m[i] = simulation.unbalance_kg_m(i);
+  return flight;
 }
 
-/// What the calibration command would learn from one healthy flight of this vehicle, and one with a trial mass.
+/// What the calibration command would learn from one healthy flight of a vehicle.
 template <std::size_t N>
-UnbalanceParams calibrated(const Multirotor& vehicle, const Condition& condition, const Realism& realism,
-                           std::uint64_t seed, double damage_mg) {
+struct Learned {
+  UnbalanceParams params;
+  std::array<double, N> natural_kg_m{};  ///< in truth
+};
+
+template <std::size_t N>
+Learned<N> calibrated(const Multirotor& vehicle, const Condition& condition, std::uint64_t seed) {
+  const Realism realism = calibration_realism_of(condition);
   UnbalanceParams params;
   params.vehicle = vehicle;
   params.vehicle.mass_kg *= condition.mass_factor;
@@ -114,88 +152,180 @@ UnbalanceParams calibrated(const Multirotor& vehicle, const Condition& condition
       realism.imu.filter_cutoff_Hz;  // as an integrator writes it, from the autopilot's settings
   params.speed_latency_s =
       std::min(0.06, 0.004 * std::round(realism.esc.latency_s / 0.004));  // the command's grid
-  auto healthy = flown<N>(vehicle, plan(Manoeuvre::kRandom, kCalibration_s, 2.3), realism,
-                          Seeds{seed, 100'000 + seed}, params, true);
+  const Flown<N> healthy = flown<N>(vehicle, plan(Manoeuvre::kRandom, kCalibration_s, 2.3), realism,
+                                    Seeds{seed, 100'000 + seed}, params, true);
   params.has_baseline = true;
-  params.speed_error_ratio = healthy.monitor().innovation().speed_error_ratio;
+  params.speed_error_ratio = healthy.judge.monitor().innovation().speed_error_ratio;
   params.most_speed_error_ratio = 0.002;
-  params.baseline_power = healthy.monitor().powers();
+  params.baseline_power = healthy.judge.monitor().powers();
+  params.against_ratio = healthy.judge.against_ratio();
   for (std::size_t i = 0; i < N; ++i) {
-    params.baseline_m_s2[i] = healthy.mean_m_s2(i);
-    params.baseline_sigma_m_s2[i] = healthy.sigma_m_s2(i);
+    params.baseline_m_s2[i] = healthy.judge.mean_m_s2(i);
+    params.baseline_sigma_m_s2[i] = healthy.judge.sigma_m_s2(i);
   }
-  if (!condition.has_trial) return params;
-  Scenario trial = plan(Manoeuvre::kRandom, kTrial_s, 2.3);
-  trial.faults = {{.kind = FaultKind::kUnbalance, .rotor = 1, .magnitude = kTrialTimes * damage_mg}};
-  const auto loaded = flown<N>(vehicle, trial, realism, Seeds{seed, 200'000 + seed}, params, true);
+  return {params, healthy.unbalance_kg_m};
+}
+
+/// Two flights with a trial mass on rotor 1, once on either blade.
+template <std::size_t N>
+void learn_response(const Multirotor& vehicle, const Condition& condition, std::uint64_t seed,
+                    double damage_mg, UnbalanceParams& params) {
+  double power = -params.baseline_m_s2[0] * params.baseline_m_s2[0];
+  for (const double half_turn : {0.0, 1.0}) {
+    Scenario trial = plan(Manoeuvre::kRandom, kTrial_s, 2.3);
+    constexpr double kBlade_rad = 0.7;  // where it is stuck, as seen from the natural unbalance: anywhere
+    trial.faults = {{.kind = FaultKind::kUnbalance,
+                     .rotor = 1,
+                     .magnitude = kTrialTimes * damage_mg,
+                     .angle_rad = kBlade_rad + half_turn * std::numbers::pi}};
+    const auto flight_seed = 200'000 + 1'000 * static_cast<std::uint64_t>(half_turn) + seed;
+    const Flown<N> loaded =
+        flown<N>(vehicle, trial, calibration_realism_of(condition), Seeds{seed, flight_seed}, params, true);
+    power += 0.5 * loaded.judge.mean_m_s2(0) * loaded.judge.mean_m_s2(0);
+  }
   const double moment_kg_m = 1e-6 * kTrialTimes * damage_mg * vehicle.propeller_radius_m;
-  params.response *=
-      (loaded.mean_m_s2(0) - params.baseline_m_s2[0]) * UnbalanceMonitor::kg_m_per_m_s2(params) / moment_kg_m;
-  return params;
+  params.response *= std::sqrt(power) * UnbalanceMonitor::kg_m_per_m_s2(params, 0) / moment_kg_m;
+  for (std::size_t i = 0; i < N; ++i) {
+    params.response_sigma_ratio[i] =
+        std::hypot(kTrialSigma, response_transfer_sigma(params.vehicle, 0, i, params.against_ratio));
+  }
+}
+
+/// "1 3" of a mask.
+std::string numbers_of(std::uint32_t mask) {
+  std::string text;
+  for (std::uint32_t i = 0; i < kMaxRotors; ++i) {
+    if ((mask >> i & 1U) != 0U) text += (text.empty() ? "" : " ") + std::to_string(i + 1);
+  }
+  return text;
+}
+
+std::string joined(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) {
+    char one[32];
+    std::snprintf(one, sizeof one, "%s%.3f", text.empty() ? "" : " ", value);
+    text += one;
+  }
+  return text;
 }
 
 template <std::size_t N>
 void print(const Condition& condition, const Vehicle& of, const char* manoeuvre, std::uint64_t seed,
-           const std::vector<std::size_t>& damaged, const UnbalanceFlightJudge<N>& judge,
+           const std::vector<std::size_t>& damaged, const Flown<N>& flight, const Learned<N>& learned,
            const UnbalanceParams& params) {
-  const double mg_per_m_s2 =
-      1e6 * UnbalanceMonitor::kg_m_per_m_s2(params) / params.vehicle.propeller_radius_m;
-  std::string truth;
+  const UnbalanceFlightJudge<N>& judge = flight.judge;
+  const double mg_per_kg_m = 1e6 / params.vehicle.propeller_radius_m;
+  std::uint32_t truth = 0;
   std::string named;
-  std::string readings;
-  for (const std::size_t rotor : damaged) truth += (truth.empty() ? "" : " ") + std::to_string(rotor + 1);
+  std::vector<double> grown_mg;
+  std::vector<double> felt_m_s2;
+  std::vector<double> reading_mg;
+  std::vector<double> low_mg;
+  std::vector<double> high_mg;
+  for (const std::size_t rotor : damaged) truth |= 1U << rotor;
   for (std::size_t i = 0; i < N; ++i) {
-    char text[64];
     if (!std::isnan(judge.raised_s[i])) {
+      char text[64];
       std::snprintf(text, sizeof text, "%s%zu@%.2f", named.empty() ? "" : " ", i + 1,
                     judge.raised_s[i] - std::max(condition.onset_s, judge.airborne_s));
       named += text;
     }
-    std::snprintf(text, sizeof text, "%s%.2f", readings.empty() ? "" : " ",
-                  mg_per_m_s2 * judge.growth_m_s2[i]);
-    readings += text;
+    const double grown_kg_m = flight.unbalance_kg_m[i] - learned.natural_kg_m[i];
+    grown_mg.push_back(mg_per_kg_m * grown_kg_m);
+    felt_m_s2.push_back(grown_kg_m / UnbalanceMonitor::kg_m_per_m_s2(learned.params, i));
+    reading_mg.push_back(mg_per_kg_m * judge.reading[i].growth_kg_m);
+    low_mg.push_back(mg_per_kg_m * judge.reading[i].low_kg_m);
+    high_mg.push_back(mg_per_kg_m * judge.reading[i].high_kg_m);
   }
-  std::printf("%s;%s;%s;%llu;%s;%s;%.1f;%s;%d;%.1f;%.1f\n", condition.name, of.name, manoeuvre,
-              static_cast<unsigned long long>(seed), truth.c_str(), named.c_str(), of.damage_mg,
-              readings.c_str(), std::isnan(judge.ambiguous_s) ? 0 : 1, judge.judged_s, judge.confounded_s);
+  std::printf("%s;%s;%s;%llu;%s;%s;%s;%s;%s;%s;%s;%s;%.1f;%.1f\n", condition.name, of.name, manoeuvre,
+              static_cast<unsigned long long>(seed), numbers_of(truth).c_str(), named.c_str(),
+              joined(grown_mg).c_str(), joined(felt_m_s2).c_str(), joined(reading_mg).c_str(),
+              joined(low_mg).c_str(), joined(high_mg).c_str(),
+              std::isnan(judge.ambiguous_s) ? "" : numbers_of(judge.candidates).c_str(), judge.judged_s,
+              judge.confounded_s);
   std::fflush(stdout);
 }
 
+/// All flights of one vehicle; what its links have in common is calibrated once.
 template <std::size_t N>
-void run(const Multirotor& vehicle, const Condition& condition, const Vehicle& of, const char* manoeuvre_word,
-         std::uint64_t first, std::uint64_t count) {
-  const std::string_view word = manoeuvre_word;
-  const Manoeuvre manoeuvre = word == "circle"  ? Manoeuvre::kCircle
-                              : word == "hover" ? Manoeuvre::kHover
-                                                : Manoeuvre::kRandom;
-  const Realism realism = realism_of(condition);
-  for (std::uint64_t seed = first; seed < first + count; ++seed) {
-    const UnbalanceParams params = calibrated<N>(vehicle, condition, realism, seed, of.damage_mg);
+class Vehicles {
+ public:
+  Vehicles(const Multirotor& vehicle, const Vehicle& of, std::uint64_t seed)
+      : vehicle_{vehicle}, of_{of}, seed_{seed} {}
+
+  void fly(const Condition& condition, const char* manoeuvre_word) {
+    const std::string_view word = manoeuvre_word;
+    const Manoeuvre manoeuvre = word == "circle"  ? Manoeuvre::kCircle
+                                : word == "hover" ? Manoeuvre::kHover
+                                                  : Manoeuvre::kRandom;
+    const double damage_mg = of_.damage_mg * condition.damage_times;
+    const Learned<N>& learned = learned_of(condition);
+    UnbalanceParams params = learned.params;
+    if (condition.has_trial) {
+      if (!tried_) {
+        learn_response<N>(vehicle_, condition, seed_, of_.damage_mg, params);
+        tried_ = params;
+      }
+      params = *tried_;
+    }
     Scenario scenario = plan(manoeuvre, condition.flight_s, 3.0);
     std::vector<std::size_t> damaged;
-    if (condition.is_damaged) damaged.push_back(seed % N);
-    if (condition.is_damaged && condition.two_rotors) damaged.push_back((seed + 1 + seed / N % (N - 1)) % N);
+    if (condition.is_damaged) damaged.push_back(seed_ % N);
+    if (condition.is_damaged && condition.two_rotors)
+      damaged.push_back((seed_ + 1 + seed_ / N % (N - 1)) % N);
     for (const std::size_t rotor : damaged) {
       scenario.faults.push_back({.kind = FaultKind::kUnbalance,
                                  .onset_s = condition.onset_s,
                                  .rotor = rotor + 1,
-                                 .magnitude = of.damage_mg});
+                                 .magnitude = damage_mg,
+                                 .angle_rad = condition.angle_rad});
     }
-    print(condition, of, manoeuvre_word, seed, damaged,
-          flown<N>(vehicle, scenario, realism, Seeds{seed, 300'000 + seed}, params, condition.has_speeds),
-          params);
+    print(condition, of_, manoeuvre_word, seed_, damaged,
+          flown<N>(vehicle_, scenario, realism_of(condition), Seeds{seed_, 300'000 + seed_}, params,
+                   condition.has_speeds),
+          learned, params);
   }
+
+ private:
+  const Learned<N>& learned_of(const Condition& condition) {
+    const Link link = link_of(condition);
+    const auto known = learned_.find(link);
+    if (known != learned_.end()) return known->second;
+    return learned_.emplace(link, calibrated<N>(vehicle_, condition, seed_)).first->second;
+  }
+
+  Multirotor vehicle_;
+  Vehicle of_;
+  std::uint64_t seed_;
+  std::map<Link, Learned<N>> learned_;
+  std::optional<UnbalanceParams> tried_;
+};
+
+template <std::size_t N>
+int fly_all(const Multirotor& multirotor, const Vehicle& vehicle, std::uint64_t seed, int argc, char** argv) {
+  Vehicles<N> vehicles{multirotor, vehicle, seed};
+  for (int k = 3; k < argc; ++k) {
+    const std::string_view both = argv[k];
+    const auto colon = both.find(':');
+    const auto condition = std::find_if(kConditions.begin(), kConditions.end(), [&](const Condition& one) {
+      return both.substr(0, colon) == one.name;
+    });
+    if (condition == kConditions.end() || colon == std::string_view::npos) {
+      std::fprintf(stderr, "unbalance_isolation: no such condition: %s\n", argv[k]);
+      return 2;
+    }
+    vehicles.fly(*condition, argv[k] + colon + 1);
+  }
+  return 0;
 }
 
-int main_of(char** argv) {
-  const auto condition = std::find_if(kConditions.begin(), kConditions.end(), [&](const Condition& one) {
+int main_of(int argc, char** argv) {
+  const auto vehicle = std::find_if(kVehicles.begin(), kVehicles.end(), [&](const Vehicle& one) {
     return std::string_view{one.name} == argv[1];
   });
-  const auto vehicle = std::find_if(kVehicles.begin(), kVehicles.end(), [&](const Vehicle& one) {
-    return std::string_view{one.name} == argv[2];
-  });
-  if (condition == kConditions.end() || vehicle == kVehicles.end()) {
-    std::fputs("unbalance_isolation: no such condition or vehicle\n", stderr);
+  if (vehicle == kVehicles.end()) {
+    std::fprintf(stderr, "unbalance_isolation: no such vehicle: %s\n", argv[1]);
     return 2;
   }
   const auto file =
@@ -204,23 +334,18 @@ int main_of(char** argv) {
     std::fprintf(stderr, "unbalance_isolation: no multirotor %s\n", vehicle->name);
     return 1;
   }
-  const auto first = std::strtoull(argv[4], nullptr, 10);
-  const auto count = std::strtoull(argv[5], nullptr, 10);
-  if (file->multirotor->rotor_count == 6) {
-    run<6>(*file->multirotor, *condition, *vehicle, argv[3], first, count);
-  } else {
-    run<4>(*file->multirotor, *condition, *vehicle, argv[3], first, count);
-  }
-  return 0;
+  const auto seed = std::strtoull(argv[2], nullptr, 10);
+  return file->multirotor->rotor_count == 6 ? fly_all<6>(*file->multirotor, *vehicle, seed, argc, argv)
+                                            : fly_all<4>(*file->multirotor, *vehicle, seed, argc, argv);
 }
 
 }  // namespace
 }  // namespace airworthy::sim
 
 int main(int argc, char** argv) {
-  if (argc != 6) {
-    std::fputs("usage: unbalance_isolation CONDITION VEHICLE MANOEUVRE FIRST_SEED COUNT\n", stderr);
+  if (argc < 4) {
+    std::fputs("usage: unbalance_isolation VEHICLE SEED CONDITION:MANOEUVRE...\n", stderr);
     return 2;
   }
-  return airworthy::sim::main_of(argv);
+  return airworthy::sim::main_of(argc, argv);
 }

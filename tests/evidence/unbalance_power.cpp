@@ -37,8 +37,8 @@ Scenario plan(Manoeuvre manoeuvre, double duration_s, double damage_mg) {
   if (manoeuvre == Manoeuvre::kRandom) segment.speed_m_s = 2.0;
   scenario.segments.push_back(segment);
   if (damage_mg > 0.0) {
-    scenario.faults.push_back(
-        Fault{.kind = FaultKind::kUnbalance, .rotor = kDamaged + 1, .magnitude = damage_mg});
+    scenario.faults.push_back(Fault{
+        .kind = FaultKind::kUnbalance, .rotor = kDamaged + 1, .magnitude = damage_mg, .angle_rad = 0.0});
   }
   return scenario;
 }

@@ -37,7 +37,7 @@ TEST(Scenario, IsRead) {
   const rt::TemporaryFolder folder;
   const auto path = folder.write("s.toml", std::string{kFlight} +
                                                "[[fault]]\nkind = \"unbalance\"\nrotor = 3\nonset_s = 6.0\n"
-                                               "tip_mass_mg = 40.0\ngrowth_mg_per_s = 2.0\n");
+                                               "tip_mass_mg = 40.0\ngrowth_mg_per_s = 2.0\nangle_deg = 90\n");
   const auto scenario = Scenario::load(path, 4);
   ASSERT_TRUE(scenario.has_value()) << scenario.error().text;
   EXPECT_EQ(scenario->duration_s(), 15.0);
@@ -47,6 +47,8 @@ TEST(Scenario, IsRead) {
   EXPECT_FALSE(fault.is_active(5.9));
   EXPECT_TRUE(fault.is_active(1e5));
   EXPECT_DOUBLE_EQ(fault.magnitude_at(8.0), 44.0);
+  ASSERT_TRUE(fault.angle_rad.has_value());
+  EXPECT_NEAR(*fault.angle_rad, 1.5707963, 1e-6);
 }
 
 TEST(Scenario, EveryBrokenRule) {
@@ -63,6 +65,12 @@ TEST(Scenario, EveryBrokenRule) {
   EXPECT_EQ(errors_with_fault("kind = \"partial_loss\"\nrotor = 5\nonset_s = 6.0\nloss_ratio = 1.5\n"),
             "s.toml:12:1: fault[0].rotor: must lie in [1, 4], is 5\n"
             "s.toml:14:1: fault[0].loss_ratio: must lie in [0, 1], is 1.5");
+  EXPECT_EQ(errors_with_fault(
+                "kind = \"unbalance\"\nrotor = 1\nonset_s = 6.0\ntip_mass_mg = 1.0\nangle_deg = 400\n"),
+            "s.toml:15:1: fault[0].angle_deg: must lie in [-360, 360], is 400");
+  EXPECT_EQ(errors_with_fault(
+                "kind = \"partial_loss\"\nrotor = 1\nonset_s = 6.0\nloss_ratio = 0.5\nangle_deg = 40\n"),
+            "s.toml:15:1: fault[0].angle_deg: unknown key");
   EXPECT_EQ(errors_with_fault("kind = \"gyro_bias\"\nrotor = 1\nonset_s = 6.0\nbias_rad_s = 0.1\n"),
             "s.toml:10:1: fault[0].axis: missing mandatory key, one of x, y, z\n"
             "s.toml:12:1: fault[0].rotor: unknown key");

@@ -13,7 +13,8 @@ constexpr std::size_t kTelemetry = 1;
 Scenario random_flight(double duration_s, double damage_mg, double interval_s) {
   std::vector<Fault> faults;
   if (damage_mg > 0.0)
-    faults.push_back(Fault{.kind = FaultKind::kUnbalance, .rotor = 2, .magnitude = damage_mg});
+    faults.push_back(
+        Fault{.kind = FaultKind::kUnbalance, .rotor = 2, .magnitude = damage_mg, .angle_rad = 0.0});
   return plan_of({Segment{.manoeuvre = Manoeuvre::kGround, .duration_s = 1.0},
                   Segment{.manoeuvre = Manoeuvre::kTakeOff, .duration_s = kTakeOff_s - 1.0, .height_m = 3.0},
                   Segment{.manoeuvre = Manoeuvre::kRandom,

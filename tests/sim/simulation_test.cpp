@@ -359,6 +359,25 @@ TEST(Faults, UnbalanceStepsAndGrowsAtTheSpeedOfItsRotor) {
   EXPECT_NEAR(line_m_s2(growth, 1, 13.25, 13.75) / expected(growth, 175.0, 13.25), 1.0, 0.2);
 }
 
+TEST(Faults, AnUnbalanceAddsToTheNaturalOneAtItsAngle) {
+  const Multirotor vehicle = vehicle_named("unbalance_medium");
+  const auto unbalance_kg_m = [&](double mass_mg, std::optional<double> angle_rad) {
+    Scenario scenario = hover_plan(10.0);
+    scenario.faults = {
+        {.kind = FaultKind::kUnbalance, .rotor = 3, .magnitude = mass_mg, .angle_rad = angle_rad}};
+    return Simulation{vehicle, scenario, Realism::at(Level::kHard), 4}.unbalance_kg_m(2);
+  };
+  const double natural = unbalance_kg_m(0.0, 0.0);
+  const double damage = 40e-6 * vehicle.propeller_radius_m;
+  EXPECT_NEAR(unbalance_kg_m(40.0, 0.0), natural + damage, 1e-12);
+  EXPECT_NEAR(unbalance_kg_m(40.0, std::numbers::pi), std::abs(natural - damage), 1e-12);
+  EXPECT_NEAR(unbalance_kg_m(40.0, 0.5 * std::numbers::pi), std::hypot(natural, damage), 1e-12);
+  // An angle that nobody gives belongs to the vehicle.
+  EXPECT_EQ(unbalance_kg_m(40.0, {}), unbalance_kg_m(40.0, {}));
+  EXPECT_LT(unbalance_kg_m(40.0, {}), natural + damage);
+  EXPECT_GT(unbalance_kg_m(40.0, {}), std::abs(natural - damage));
+}
+
 TEST(Faults, TelemetryFreezesAndShowsTheWrongUnit) {
   const Recorder frozen = fly_with({.kind = FaultKind::kTelemetryFrozen, .onset_s = 8.0, .rotor = 2});
   std::set<double> before;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -64,20 +65,30 @@ class UnbalanceFlightJudge final : public Output {
   [[nodiscard]] double sigma_m_s2(std::size_t rotor) const {
     return std::sqrt(std::max(0.0, squares_[rotor] / count_[rotor] - mean_m_s2(rotor) * mean_m_s2(rotor)));
   }
-  [[nodiscard]] RotorUnbalanceMonitor<N>& monitor() { return *monitor_; }
+  /// Of what turns against the rotors to what turns with them, as the calibration command learns it.
+  [[nodiscard]] double against_ratio() const {
+    double with = 0.0;
+    for (const double square : squares_) with += square;
+    return with > 0.0 ? std::clamp(std::sqrt(against_squares_ / with), 0.05, 1.0) : 0.3;
+  }
+  [[nodiscard]] const RotorUnbalanceMonitor<N>& monitor() const { return *monitor_; }
 
   std::array<double, N> raised_s{};  ///< first time each rotor was reported; NaN = never
+  std::uint32_t candidates = 0;      ///< of an unbalance that was nobody's
   double ambiguous_s = std::numeric_limits<double>::quiet_NaN();
   double airborne_s = std::numeric_limits<double>::quiet_NaN();
   double judged_s = 0.0;
-  double confounded_s = 0.0;            ///< of those, with a rotor that could not be told from another
-  std::array<double, N> growth_m_s2{};  ///< newest
+  double confounded_s = 0.0;                  ///< of those, with a rotor that could not be told from another
+  std::array<UnbalanceReading, N> reading{};  ///< newest
 
  private:
   void note(double time_s) {
     const double period_s = to_seconds(UnbalanceMonitor::kPeriod);
     const auto rotors = monitor_->rotors();
-    if (monitor_->ambiguity() == FaultLifeCycle::Transition::kRaise) ambiguous_s = time_s;
+    if (monitor_->ambiguity() == FaultLifeCycle::Transition::kRaise) {
+      ambiguous_s = time_s;
+      candidates |= monitor_->candidates();
+    }
     const bool judges = monitor_->state() == DetectorState::kMonitoring;
     if (judges) judged_s += period_s;
     bool confounded = false;
@@ -86,9 +97,10 @@ class UnbalanceFlightJudge final : public Output {
         raised_s[i] = time_s;
       confounded = confounded || rotors[i].reason == UnbalanceNotJudged::kConfounded;
       if (!judges || rotors[i].reason != UnbalanceNotJudged::kJudged) continue;
-      growth_m_s2[i] = rotors[i].growth_m_s2;
+      reading[i] = rotors[i].reading;
       sum_[i] += rotors[i].amplitude_m_s2;
       squares_[i] += rotors[i].amplitude_m_s2 * rotors[i].amplitude_m_s2;
+      against_squares_ += rotors[i].against_m_s2 * rotors[i].against_m_s2;
       count_[i] += 1.0;
     }
     if (judges && confounded) confounded_s += period_s;
@@ -100,6 +112,7 @@ class UnbalanceFlightJudge final : public Output {
   std::array<double, N> sum_{};
   std::array<double, N> squares_{};
   std::array<double, N> count_{};
+  double against_squares_ = 0.0;
 };
 
 }  // namespace airworthy::sim

@@ -5,6 +5,9 @@
 #include <cstddef>
 #include <utility>
 
+#include "core/detectors/unbalance/rigid_body_response.h"
+#include "core/detectors/unbalance/rotors_together.h"
+
 namespace airworthy {
 namespace {
 
@@ -24,8 +27,9 @@ constexpr double kLeak = 0.05;             // of another rotor's amplitude, that
 // The growth of a rotor that turns apart by d rad/s leaks through a tracker of this time constant by 1/√(1 + (d·T)²).
 constexpr double kTrackerTime_s = 0.3;
 constexpr double kSpeedsSmoothed_s = 1.0;
-constexpr double kConfounded = 0.5;  // correlation of two rotors' amplitudes
-constexpr double kMostLoad = 2.5;    // thrust by rotor speeds over weight, and its inverse
+constexpr double kConfounded = 0.5;          // correlation of two rotors' amplitudes
+constexpr double kMostResponseSigma = 0.45;  // beyond which the upper end of a reading is anywhere
+constexpr double kMostLoad = 2.5;            // thrust by rotor speeds over weight, and its inverse
 
 SignalPowerParams power_params(const UnbalanceParams& params) {
   SignalPowerParams power;
@@ -61,6 +65,10 @@ double UnbalanceMonitor::hover_speed_rad_s(const Multirotor& vehicle) noexcept {
 double UnbalanceMonitor::kg_m_per_m_s2(const UnbalanceParams& params) noexcept {
   const double speed = hover_speed_rad_s(params.vehicle);
   return params.vehicle.mass_kg / (params.response * speed * speed);
+}
+
+double UnbalanceMonitor::kg_m_per_m_s2(const UnbalanceParams& params, std::size_t rotor) noexcept {
+  return kg_m_per_m_s2(params) / rigid_body_response(params.vehicle, rotor);
 }
 
 template <std::size_t N>
@@ -121,6 +129,7 @@ bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double 
     estimated_s_ = 0.0;
     power_m2_s4_.fill(0.0);
     against_power_m2_s4_.fill(0.0);
+    steady_ = {};
     fallback_.restart();
     tracking_since_ = time;
   }
@@ -237,7 +246,26 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
                    : !is_informed && gain < kLeastGain        ? UnbalanceNotJudged::kUnfitInertialData
                    : rotor.confounded_with != 0U              ? UnbalanceNotJudged::kConfounded
                                                               : UnbalanceNotJudged::kConverging;
+    if (!tracker_.explains()) steady_[k].restart();
+    if (rotor.reason == UnbalanceNotJudged::kJudged) {
+      const double power = tracker_.turning_m_s2(k, prior_.spin[k]).squared() - 2.0 * variance;
+      steady_[k].add(power, rotor.sigma_m_s2, rotor.amplitude_m_s2, dt_s);
+    }
+    const double baseline = rotor.amplitude_m_s2 - rotor.growth_m_s2;
+    const double baseline_sigma = params_.has_baseline ? params_.baseline_sigma_m_s2[k] : 0.0;
+    read_mass(k, steady_[k].amplitude_m_s2() - baseline, std::hypot(steady_[k].sigma_m_s2(), baseline_sigma));
   }
+}
+
+template <std::size_t N>
+void RotorUnbalanceMonitor<N>::read_mass(std::size_t rotor, double growth_m_s2, double sigma_m_s2) noexcept {
+  const double kg_m = kg_m_per_m_s2(params_, rotor);
+  const double ratio = std::min(params_.response_sigma_ratio[rotor], kMostResponseSigma);
+  rotor_[rotor].reading = {
+      .growth_kg_m = kg_m * growth_m_s2,
+      .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2),
+      .low_kg_m = kg_m * (growth_m_s2 - kSigmas * sigma_m_s2) / (1.0 + kSigmas * ratio),
+      .high_kg_m = kg_m * (growth_m_s2 + kSigmas * sigma_m_s2) / (1.0 - kSigmas * ratio)};
 }
 
 template <std::size_t N>
@@ -319,12 +347,47 @@ double RotorUnbalanceMonitor<N>::shared_growth_m_s2(std::size_t rotor) const noe
 }
 
 template <std::size_t N>
+std::uint32_t RotorUnbalanceMonitor<N>::grown_together(std::size_t rotor) const noexcept {
+  if (!params_.has_baseline || rotor_[rotor].confounded_with == 0U || !tracker_.explains()) return 0;
+  // And those that these cannot be told from, and so on.
+  std::uint32_t alike = 1U << rotor;
+  for (std::size_t pass = 0; pass < N; ++pass) {
+    for (std::size_t i = 0; i < N; ++i) {
+      if ((alike >> i & 1U) != 0U) alike |= rotor_[i].confounded_with;
+    }
+  }
+  const int spin = prior_.spin[rotor];
+  std::uint32_t suspects = 0;
+  double baseline = 0.0;
+  double variance = 0.0;
+  for (std::size_t i = 0; i < N; ++i) {
+    if ((alike >> i & 1U) == 0U) continue;
+    if (is_known_[i]) return 0;  // it may all be of the one that is known
+    if (prior_.spin[i] != spin) continue;
+    suspects |= 1U << i;
+    baseline += params_.baseline_m_s2[i];
+    variance += params_.baseline_sigma_m_s2[i] * params_.baseline_sigma_m_s2[i];
+  }
+  const auto with = rotors_together<double>(tracker_, alike, spin);
+  // An uneven airframe turns a part of the other sense into this one.
+  const auto against = rotors_together<double>(tracker_, alike, -spin);
+  const double doubt = kSigmas * std::sqrt(variance + with.sigma_m_s2 * with.sigma_m_s2);
+  const double growth =
+      with.amplitude_m_s2 - params_.against_ratio * against.amplitude_m_s2 - baseline - doubt;
+  if (growth <= params_.smallest_m_s2) return 0;
+  const bool is_alone = suspects == 1U << rotor;  // among rotors of the other sense: of them all, then
+  return is_alone ? alike : suspects;
+}
+
+template <std::size_t N>
 void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_faulty) noexcept {
   bool is_pinned = false;
   double most_growth = 0.0;
   std::uint32_t suspects = 0;
+  std::uint32_t grown = 0;
   for (std::size_t i = 0; i < N; ++i) {
     if (is_known_[i]) continue;
+    grown |= grown_together(i);
     const RotorUnbalance& rotor = rotor_[i];
     is_pinned = is_pinned || (rotor.log_odds >= params_.log_odds && rotor.confounded_with == 0U);
     most_growth = std::max(most_growth, shared_growth_m_s2(i));
@@ -334,12 +397,12 @@ void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_fau
       std::none_of(is_known_.begin(), is_known_.end(), [](bool known) { return known; });
   const bool is_nobodys =
       (log_odds_faulty > params_.log_odds && !is_pinned && most_growth > params_.smallest_m_s2) ||
-      (somebody_has_grown_ && nobody_is_known);
+      (somebody_has_grown_ && nobody_is_known) || grown != 0U;
   ambiguous_.step(is_nobodys, now);
   if (is_nobodys && !ambiguity_life_.active()) {
-    candidates_ = suspects;
+    candidates_ = grown != 0U ? grown : suspects;
     for (std::size_t i = 0; i < N; ++i) {
-      if ((suspects >> i & 1U) != 0U) candidates_ |= rotor_[i].confounded_with;
+      if (grown == 0U && (suspects >> i & 1U) != 0U) candidates_ |= rotor_[i].confounded_with;
     }
     ambiguous_since_ = ambiguous_.since;
   }
@@ -401,6 +464,7 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
   if (speeds_fail && power_is_felt && fallback_.is_ready() && fallback_.has_fresh_commands(now)) {
     state_ = DetectorState::kMonitoring;
     judge_by_power(now, dt_s);
+    for (std::size_t i = 0; i < N; ++i) read_mass(i, rotor_[i].growth_m_s2, rotor_[i].growth_sigma_m_s2);
     return;
   }
   state_ = reason == UnbalanceNotJudged::kJudged       ? DetectorState::kMonitoring

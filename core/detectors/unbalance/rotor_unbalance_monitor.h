@@ -2,6 +2,7 @@
 
 #include "core/detectors/unbalance/power_fallback.h"
 #include "core/detectors/unbalance/rotor_hypotheses.h"
+#include "core/detectors/unbalance/steady_amplitude.h"
 #include "core/detectors/unbalance/unbalance_monitor.h"
 #include "core/estimators/unbalance/order_tracker.h"
 
@@ -46,6 +47,8 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
 
   void judge(TimePoint now) noexcept;
   void estimate(double dt_s) noexcept;
+  /// RotorUnbalance::reading of a growth in m/s² and its sigma without that of the response.
+  void read_mass(std::size_t rotor, double growth_m_s2, double sigma_m_s2) noexcept;
   void note_leader(const std::optional<typename Hypotheses::Verdict>& verdict) noexcept;
   void test_rotors(TimePoint now) noexcept;
   void note_speeds(double dt_s) noexcept;
@@ -60,6 +63,9 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   [[nodiscard]] double correlation(std::size_t i, std::size_t j) const noexcept;
   /// Growth of a rotor together with those it cannot be told from.
   [[nodiscard]] double shared_growth_m_s2(std::size_t rotor) const noexcept;
+  /// The rotors of one sense, among those that cannot be told from `rotor`, that make more together than they could as
+  /// calibrated; 0 if none do.
+  [[nodiscard]] std::uint32_t grown_together(std::size_t rotor) const noexcept;
   [[nodiscard]] bool speeds_carry_the_vehicle() const noexcept;
   /// What the sensors leave of a vibration, 1 = all; the high-pass is not theirs.
   [[nodiscard]] double sensor_gain(double speed_rad_s) const noexcept;
@@ -72,6 +78,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   std::array<double, N> power_m2_s4_{};  ///< smoothed |A₊|² less its variance
   std::array<double, N> against_power_m2_s4_{};
   double estimated_s_ = 0.0;
+  std::array<SteadyAmplitude, N> steady_{};
   std::array<FaultLifeCycle, N> life_;
   std::array<Held, N> grown_{};
   std::array<std::array<double, N>, N> apart2_rad2_s2_{};  ///< mean square difference of speeds

@@ -12,8 +12,8 @@
 
 namespace airworthy {
 
-/// Amplitudes are accelerations of the whole vehicle at hover speed, m/s²; a mass m·r at the rotor makes
-/// response · m·r·ω₀² / vehicle mass of it.
+/// Amplitudes are accelerations at the accelerometer at hover speed, m/s²; a mass m·r at rotor i makes
+/// response · Gᵢ · m·r·ω₀² / vehicle mass of it, Gᵢ of rigid_body_response.h.
 struct UnbalanceParams {
   Multirotor vehicle;
   double smallest_m_s2 = 0.4;         ///< advisory: growth over the baseline that is reported
@@ -24,7 +24,10 @@ struct UnbalanceParams {
   std::array<double, kMaxRotors> baseline_m_s2{};
   std::array<double, kMaxRotors> baseline_sigma_m_s2{};
   std::array<double, kMaxRotors> baseline_power{};  ///< of the signal-power filter, (U/U₀)²
-  double response = 1.0;       ///< acceleration felt / force over mass, mean of x and y, near the rotor speed
+  double response = 1.0;  ///< acceleration felt / that of a rigid body, mean of x and y, near the rotor speed
+  /// 1σ of response·Gᵢ over vehicle mass, of itself. Before a trial mass has measured it: that an airframe answers one axis
+  /// more than the other by half again and more (Bebop 2: 1.6), and a battery or payload that the file does not tell.
+  std::array<double, kMaxRotors> response_sigma_ratio{0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25};
   double against_ratio = 0.3;  ///< part of the vibration that turns against the rotor, of an uneven airframe
   double low_pass_Hz = 0.0;    ///< of the accelerometer; 0 = not known
   double speed_latency_s = 0.0;  ///< of the telemetry
@@ -54,6 +57,14 @@ enum class UnbalanceNotJudged : std::uint8_t {
   kConfounded,         ///< turns too much like another rotor
 };
 
+/// The growth of one rotor as a mass times radius. kg·m.
+struct UnbalanceReading {
+  double growth_kg_m = 0.0;
+  double sigma_kg_m = 0.0;
+  double low_kg_m = 0.0;  ///< the truth is between low and high in 95 % of the flights
+  double high_kg_m = 0.0;
+};
+
 /// What is known of the unbalance of one rotor.
 struct RotorUnbalance {
   double amplitude_m_s2 = 0.0;
@@ -61,6 +72,7 @@ struct RotorUnbalance {
   double against_m_s2 = 0.0;  ///< amplitude of the part that turns against the rotor
   double growth_m_s2 = 0.0;   ///< over the baseline
   double growth_sigma_m_s2 = 0.0;
+  UnbalanceReading reading;
   bool by_power = false;    ///< by the signal-power filter, as the speeds of the rotors are not known
   double log_odds = 0.0;    ///< that this rotor is out of balance, against everything else
   double test_ratio = 0.0;  ///< alarm at 1
@@ -117,8 +129,10 @@ class UnbalanceMonitor {
   /// What the signal-power filter has learned of each rotor, (U/U₀)²: UnbalanceParams::baseline_power for a calibration.
   [[nodiscard]] virtual std::array<double, kMaxRotors> powers() const noexcept = 0;
 
-  /// Mass times radius that makes an amplitude of 1 m/s² at hover speed. kg·m.
+  /// Mass times radius that makes an amplitude of 1 m/s² at hover speed, felt in the centre of mass. kg·m.
   [[nodiscard]] static double kg_m_per_m_s2(const UnbalanceParams& params) noexcept;
+  /// The same felt where the accelerometer is, of one rotor.
+  [[nodiscard]] static double kg_m_per_m_s2(const UnbalanceParams& params, std::size_t rotor) noexcept;
   [[nodiscard]] static double hover_speed_rad_s(const Multirotor& vehicle) noexcept;
 
  protected:

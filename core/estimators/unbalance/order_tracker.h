@@ -142,6 +142,8 @@ class OrderTracker {
     const Scalar im = covariance_m2_s4(2 * rotor + 1, 2 * rotor + 1);
     return static_cast<Scalar>(0.25) * (re + im);
   }
+  /// θ of (1), in 0 … 2π.
+  [[nodiscard]] Scalar phase_rad(std::size_t rotor) const noexcept { return phase_[rotor]; }
   /// Whether two rotors have turned differently enough of late for P to be believed between them.
   [[nodiscard]] bool are_apart(std::size_t i, std::size_t j) const noexcept {
     return separation_.are_apart(i, j);

@@ -7,7 +7,7 @@ namespace airworthy {
 
 /// Which rotors have turned differently enough to be told apart by their phases, whatever their telemetry's noise.
 ///   Turned     Dᵢ ← Dᵢ·(1 − Δt/T) + ωᵢ·Δt;  its noise Vᵢ ← Vᵢ·(1 − 2·Δt/T) + qᵢ·Δt                          (1)
-///   Apart      (Dᵢ − Dⱼ)² > 4²·(Vᵢ + Vⱼ) within the last 5 s                                               (2)
+///   Apart      (Dᵢ − Dⱼ)² > 5²·(Vᵢ + Vⱼ) within the last 5 s                                               (2)
 ///   Source     our own; docs/equations/order_tracking.md, "Equal speeds"
 ///   Symbols    Dᵢ → turned_ [rad]; Vᵢ → variance_ [rad²]; qᵢ: random walk of the phase by noise of the telemetry [rad²/s];
 ///              T = 1 s
@@ -41,7 +41,7 @@ class RotorSeparation {
  private:
   static constexpr Scalar kWindow_s = 1;
   static constexpr Scalar kMemory_s = 5;
-  static constexpr Scalar kSigmas = 4;
+  static constexpr Scalar kSigmas = 5;
 
   std::array<Scalar, N> turned_{};
   std::array<Scalar, N> variance_{};

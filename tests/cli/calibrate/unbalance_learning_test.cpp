@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "runtime/bus/log_writer.h"
 #include "sim/output/log_output.h"
 #include "sim/simulation.h"
@@ -24,7 +27,8 @@ class UnbalanceLearningTest : public ::testing::Test {
         AIRWORTHY_CONFIG "/unbalance.toml",
         {"vehicle=" AIRWORTHY_CONFIG "/vehicles/unbalance_medium.toml", "input.accel_low_pass_Hz=180"})};
     record("healthy", "medium", 40.0, 11, 0.0);
-    record("trial", "medium", 40.0, 12, kTrial_mg);
+    record("trial", "medium", 40.0, 12, kTrial_mg, 1.0);
+    record("other_blade", "medium", 40.0, 15, kTrial_mg, 1.0 + std::numbers::pi);
     record("short", "medium", 12.0, 13, 0.0);
     record("foreign", "other", 12.0, 14, 0.0);
   }
@@ -34,13 +38,14 @@ class UnbalanceLearningTest : public ::testing::Test {
   }
 
   static void record(const std::string& name, const std::string& vehicle, double duration_s,
-                     std::uint64_t seed, double mass_mg) {
+                     std::uint64_t seed, double mass_mg, double angle_rad = 0.0) {
     sim::Scenario scenario;
     scenario.segments = {{.manoeuvre = sim::Manoeuvre::kGround, .duration_s = 2.0},
                          {.manoeuvre = sim::Manoeuvre::kTakeOff, .duration_s = 4.0, .height_m = 3.0},
                          {.manoeuvre = sim::Manoeuvre::kRandom, .duration_s = duration_s, .speed_m_s = 2.0}};
     if (mass_mg > 0.0) {
-      scenario.faults = {{.kind = sim::FaultKind::kUnbalance, .rotor = 3, .magnitude = mass_mg}};
+      scenario.faults = {
+          {.kind = sim::FaultKind::kUnbalance, .rotor = 3, .magnitude = mass_mg, .angle_rad = angle_rad}};
     }
     auto writer = rt::LogWriter::create(log(name));
     ASSERT_TRUE(writer.has_value()) << writer.error().text;
@@ -61,7 +66,8 @@ rt::TemporaryFolder* UnbalanceLearningTest::folder_ = nullptr;
 unbalance::UnbalanceConfig* UnbalanceLearningTest::config_ = nullptr;
 
 TEST_F(UnbalanceLearningTest, LearnsBaselineNoiseLagAndWithATrialMassTheResponse) {
-  const auto learned = learn_unbalance({log("healthy")}, {{log("trial"), 3, kTrial_mg}}, *config_, 2);
+  const auto learned = learn_unbalance(
+      {log("healthy")}, {{log("trial"), 3, kTrial_mg}, {log("other_blade"), 3, kTrial_mg}}, *config_, 2);
   ASSERT_TRUE(learned.has_value()) << learned.error().text;
   const unbalance::Calibration& calibration = learned->calibration;
   EXPECT_EQ(calibration.vehicle, "medium");
@@ -85,7 +91,31 @@ TEST_F(UnbalanceLearningTest, LearnsBaselineNoiseLagAndWithATrialMassTheResponse
   const double true_response = 0.5 *
                                (same.vehicle().vibration_response[0] + same.vehicle().vibration_response[1]) *
                                config_->monitor.vehicle.mass_kg / same.vehicle().mass_kg;
-  EXPECT_NEAR(calibration.response, true_response, 0.15 * true_response);
+  EXPECT_NEAR(calibration.response, true_response, 0.08 * true_response);
+  for (const auto& rotor : calibration.rotors) EXPECT_LT(rotor.response_sigma_ratio, 0.1);
+  EXPECT_LT(calibration.rotors[2].response_sigma_ratio, calibration.rotors[3].response_sigma_ratio)
+      << "most is known of the rotor of the trial";
+  EXPECT_TRUE(learned->notes.empty()) << learned->notes.front();
+}
+
+TEST_F(UnbalanceLearningTest, OneTrialSaysHowLittleItKnowsOfThePhase) {
+  const auto learned = learn_unbalance({log("healthy")}, {{log("trial"), 3, kTrial_mg}}, *config_, 2);
+  ASSERT_TRUE(learned.has_value()) << learned.error().text;
+  ASSERT_EQ(learned->notes.size(), 1U);
+  EXPECT_THAT(learned->notes[0], HasSubstr("rotor 3: one trial only"));
+  // A healthy propeller's amplitude over √2, of the mass's.
+  const auto& rotor = learned->calibration.rotors[2];
+  UnbalanceParams params = config_->monitor;
+  params.response = learned->calibration.response;
+  const double made =
+      1e-6 * kTrial_mg * params.vehicle.propeller_radius_m / UnbalanceMonitor::kg_m_per_m_s2(params, 2);
+  EXPECT_NEAR(rotor.response_sigma_ratio, rotor.baseline_m_s2 / std::sqrt(2.0) / made, 0.01);
+}
+
+TEST_F(UnbalanceLearningTest, WithoutATrialMassTheFileIsBelievedAndItsDoubtIsStated) {
+  const auto learned = learn_unbalance({log("healthy")}, {}, *config_, 2);
+  ASSERT_TRUE(learned.has_value()) << learned.error().text;
+  for (const auto& rotor : learned->calibration.rotors) EXPECT_EQ(rotor.response_sigma_ratio, 0.25);
 }
 
 TEST_F(UnbalanceLearningTest, RefusesWhatTeachesNothing) {

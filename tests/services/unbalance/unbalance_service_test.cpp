@@ -40,8 +40,11 @@ class UnbalanceServiceTest : public ::testing::Test {
     scenario.segments = {{.manoeuvre = sim::Manoeuvre::kGround, .duration_s = 2.0},
                          {.manoeuvre = sim::Manoeuvre::kTakeOff, .duration_s = 4.0, .height_m = 3.0},
                          {.manoeuvre = sim::Manoeuvre::kCircle, .duration_s = 60.0}};
-    scenario.faults = {
-        {.kind = sim::FaultKind::kUnbalance, .onset_s = kOnset_s, .rotor = 4, .magnitude = kDamage_mg}};
+    scenario.faults = {{.kind = sim::FaultKind::kUnbalance,
+                        .onset_s = kOnset_s,
+                        .rotor = 4,
+                        .magnitude = kDamage_mg,
+                        .angle_rad = 0.0}};
     return scenario;
   }
 

@@ -229,6 +229,47 @@ TEST(RotorUnbalanceMonitor, InAStillHoverNobodyIsBlamed) {
     EXPECT_EQ(flight.reason(i), Reason::kConfounded);
     EXPECT_EQ(flight.monitor.rotors()[i].confounded_with, 0b1111U & ~(1U << i));
   }
+  // One of those that turn its way.
+  EXPECT_TRUE(flight.is_ambiguous);
+  EXPECT_EQ(flight.candidates, 0b0011U);
+}
+
+TEST(RotorUnbalanceMonitor, InAStillHoverBaselinesThatHappenToPointOneWayAreNoUnbalance) {
+  UnbalanceParams params = params_with_baseline();
+  params.baseline_m_s2 = {2.0, 2.0, 0.1, 0.4};
+  Flight flight{params};
+  flight.natural = {2.0, 2.0, 0.1, 0.4};
+  flight.offset_rad_s.fill(0.0);
+  flight.wander_rad_s.fill(0.0);
+  flight.fly(60.0);
+  EXPECT_EQ(flight.blamed, 0U);
+  EXPECT_FALSE(flight.is_ambiguous);
+}
+
+TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
+  UnbalanceParams params = params_with_baseline();
+  params.vehicle.inertia_kg_m2 = {0.0045, 0.0045, 0.0076};
+  params.vehicle.imu_position_m = {0.01, 0.005, 0.01};
+  params.vehicle.rotor[1].position_m = {-0.117, -0.117, -0.02};
+  Flight flight{params};
+  flight.damage[1] = 2.0;
+  flight.fly(20.0);
+  const UnbalanceReading& reading = flight.monitor.rotors()[1].reading;
+  // Felt 2 m/s² where the accelerometer is.
+  const double truth = 2.0 * UnbalanceMonitor::kg_m_per_m_s2(params, 1);
+  EXPECT_NE(truth, 2.0 * UnbalanceMonitor::kg_m_per_m_s2(params));
+  EXPECT_NEAR(reading.growth_kg_m, truth, 0.05 * truth);
+  EXPECT_GT(reading.sigma_kg_m, 0.25 * reading.growth_kg_m) << "the response is not measured";
+  EXPECT_LT(reading.low_kg_m, truth / 1.4);
+  EXPECT_GT(reading.high_kg_m, truth * 1.4);
+
+  params.response_sigma_ratio.fill(0.03);
+  Flight measured{params};
+  measured.damage[1] = 2.0;
+  measured.fly(20.0);
+  EXPECT_LT(measured.monitor.rotors()[1].reading.sigma_kg_m, 0.1 * truth);
+  EXPECT_LT(measured.monitor.rotors()[1].reading.low_kg_m, truth);
+  EXPECT_GT(measured.monitor.rotors()[1].reading.high_kg_m, truth);
 }
 
 TEST(RotorUnbalanceMonitor, WhatWasFoundStaysFoundInAStillHover) {
