@@ -27,7 +27,6 @@ CONDITIONS = {
     "dropouts_20": ("20 % of the reports lost", ("random", "circle")),
     "slow_coarse": ("telemetry at 50 Hz in steps of 100 rev/min", ("random", "circle")),
     "averaged_200Hz": ("inertial data averaged, 200 Hz", ("random", "circle")),
-    "averaged_200Hz_x3": ("the same, three times the damage", ("random", "circle")),
     "averaged_200Hz_healthy": ("the same, healthy", ("random", "circle")),
     "still_air": ("hover in still air", ("hover",)),
 }

@@ -65,6 +65,10 @@ class UnbalanceFlightJudge final : public Output {
   [[nodiscard]] double sigma_m_s2(std::size_t rotor) const {
     return std::sqrt(std::max(0.0, squares_[rotor] / count_[rotor] - mean_m_s2(rotor) * mean_m_s2(rotor)));
   }
+  /// Of the rotor that was judged least.
+  [[nodiscard]] double least_judged_s() const {
+    return to_seconds(UnbalanceMonitor::kPeriod) * *std::min_element(count_.begin(), count_.end());
+  }
   /// Of what turns against the rotors to what turns with them, as the calibration command learns it.
   [[nodiscard]] double against_ratio() const {
     double with = 0.0;

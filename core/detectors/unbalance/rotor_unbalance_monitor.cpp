@@ -261,11 +261,14 @@ template <std::size_t N>
 void RotorUnbalanceMonitor<N>::read_mass(std::size_t rotor, double growth_m_s2, double sigma_m_s2) noexcept {
   const double kg_m = kg_m_per_m_s2(params_, rotor);
   const double ratio = std::min(params_.response_sigma_ratio[rotor], kMostResponseSigma);
-  rotor_[rotor].reading = {
-      .growth_kg_m = kg_m * growth_m_s2,
-      .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2),
-      .low_kg_m = kg_m * (growth_m_s2 - kSigmas * sigma_m_s2) / (1.0 + kSigmas * ratio),
-      .high_kg_m = kg_m * (growth_m_s2 + kSigmas * sigma_m_s2) / (1.0 - kSigmas * ratio)};
+  const double low = growth_m_s2 - kSigmas * sigma_m_s2;
+  const double high = growth_m_s2 + kSigmas * sigma_m_s2;
+  const double more = 1.0 + kSigmas * ratio;  // of the response than was assumed: the mass is less
+  const double less = 1.0 - kSigmas * ratio;
+  rotor_[rotor].reading = {.growth_kg_m = kg_m * growth_m_s2,
+                           .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2),
+                           .low_kg_m = kg_m * low / (low > 0.0 ? more : less),
+                           .high_kg_m = kg_m * high / (high > 0.0 ? less : more)};
 }
 
 template <std::size_t N>

@@ -263,6 +263,15 @@ TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
   EXPECT_LT(reading.low_kg_m, truth / 1.4);
   EXPECT_GT(reading.high_kg_m, truth * 1.4);
 
+  // A propeller that shakes less than it did has lost what it grew.
+  Flight mended{params};
+  mended.natural[3] = 0.0;
+  mended.fly(20.0);
+  const UnbalanceReading& less = mended.monitor.rotors()[3].reading;
+  EXPECT_LT(less.growth_kg_m, 0.0);
+  EXPECT_LT(less.low_kg_m, less.growth_kg_m);
+  EXPECT_GT(less.high_kg_m, less.growth_kg_m);
+
   params.response_sigma_ratio.fill(0.03);
   Flight measured{params};
   measured.damage[1] = 2.0;
