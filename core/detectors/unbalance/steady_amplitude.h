@@ -8,7 +8,7 @@ namespace airworthy {
 /// The amplitude of one rotor over the time since it last changed: for a mass, where the newest half second is for alarms.
 ///   Power      p ← p + Δt/min(t, T)·(|Â|² − 2σ² − p),  t the time since a change, T = 20 s                     (1)
 ///   Sigma      σ/√max(1, min(t, T)/τ): errors of the tracker last for about τ = 1.6 s                          (2)
-///   Change     newest amplitude, of the last t₀ = 0.5 s, more than 2σ from √p: p its square, t = t₀              (3)
+///   Change     newest amplitude, of the last t₀ = 0.5 s, more than 3σ from √p: p its square, t = t₀              (3)
 ///   Symbols    p → power_ [m²/s⁴];  σ → sigma_m_s2, of a real part of Â;  t → age_s_
 class SteadyAmplitude {
  public:
@@ -32,7 +32,7 @@ class SteadyAmplitude {
   static constexpr double kMost_s = 20.0;
   static constexpr double kErrorsLast_s = 1.6;
   static constexpr double kNewest_s = 0.5;
-  static constexpr double kSigmas = 2.0;
+  static constexpr double kSigmas = 3.0;
   double power_ = 0.0;
   double sigma_m_s2_ = 0.0;
   double age_s_ = 0.0;
