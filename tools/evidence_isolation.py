@@ -177,7 +177,7 @@ HEADER = ["| experiment | manoeuvre | vehicle | flights | r / w / p / – | amb.
 
 def unbalance(arguments):
     known = [*CONDITIONS, *ALIKE, *NO_SPEEDS, "hours"]
-    chosen = arguments.rows or known
+    chosen = known if arguments.rows is None else arguments.rows
     unknown = [condition for condition in chosen if condition not in known]
     if unknown:
         raise Failed(f"no rows called {', '.join(unknown)}; there are {', '.join(known)}")
@@ -185,10 +185,14 @@ def unbalance(arguments):
     where, commit = circumstances(), output("git", "rev-parse", "--short=8", "HEAD")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         rows = [row for found in pool.map(flights, jobs_of(chosen, arguments.flights or SEEDS)) for row in found]
-    write(rows, kept_sections(), where, commit)
+    kept = kept_sections()
+    newest = f"Newest rows: {where}"
+    if not rows:
+        newest = next((line for line in kept.get("", []) if line.startswith("Newest rows: ")), newest)
+    write(rows, kept, newest, commit)
 
 
-def write(rows, kept, where, commit):
+def write(rows, kept, newest, commit):
     no_speeds = list(table(rows, NO_SPEEDS, [], commit))
     page(PAGE, [
         "# Unbalance in simulated flights", "",
@@ -198,7 +202,7 @@ def write(rows, kept, where, commit):
         "healthy flight of 60 s of the same vehicle in other gusts. Damage is 5 mg at the tip of the 39 g vehicle, else 40 mg, of",
         "a rotor that changes with the seed, at any angle to the unbalance that every propeller has of its own. 40 s of flight,",
         "120 s without rotor speeds. One set of parameters for all three: growth of 0.3 m/s² at hover is reported. Seeds 1 to 20.", "",
-        f"Newest rows: {where}", "",
+        newest, "",
         "**What is the truth.** A propeller with the unbalance n that loses the mass d shakes by |n + d|, in the plane of the",
         "rotor. The monitor knows |n| from the calibration and sees |n + d|, as the phase of a rotor begins anywhere in each flight:",
         "the true growth is |n + d| − |n|, in mg at the tip. Damage that lies opposite to n makes up for it. Flights whose growth",
