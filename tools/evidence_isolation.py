@@ -39,9 +39,9 @@ NO_SPEEDS = {
     "no_speeds_healthy": ("the same, healthy", ("random", "circle")),
 }
 NO_SPEEDS_HEADING = "## Without rotor speeds"
-FIELDS = ("condition", "vehicle", "manoeuvre", "seed", "truth", "named", "grown_mg", "felt_m_s2", "reading_mg", "low_mg", "high_mg",
+FIELDS = ("condition", "vehicle", "manoeuvre", "seed", "truth", "named", "true_mg", "felt_m_s2", "reading_mg", "low_mg", "high_mg",
           "candidates", "judged_s", "confounded_s")
-LISTS = ("grown_mg", "felt_m_s2", "reading_mg", "low_mg", "high_mg")
+LISTS = ("true_mg", "felt_m_s2", "reading_mg", "low_mg", "high_mg")
 
 
 def flights(job):
@@ -88,9 +88,9 @@ def result(rows):
     # Of two rotors the later one counts.
     times = [max(row["named"].values()) for row in right]
     read = [(row, rotor - 1) for row in shown for rotor in row["seen"] & set(row["named"])]
-    ratios = [row["reading_mg"][i] / row["grown_mg"][i] for row, i in read]
+    ratios = [row["reading_mg"][i] / row["true_mg"][i] for row, i in read]
     within = sum(abs(ratio - 1) <= 0.2 for ratio in ratios)
-    inside = sum(row["low_mg"][i] <= row["grown_mg"][i] <= row["high_mg"][i] for row, i in read)
+    inside = sum(row["low_mg"][i] <= row["true_mg"][i] <= row["high_mg"][i] for row, i in read)
     half = [50 * (row["high_mg"][i] - row["low_mg"][i]) / row["reading_mg"][i] for row, i in read]
     time = f"{statistics.median(times):.1f}, {quantile(times, 0.95):.1f}" if times else "–"
     mass = (f"{statistics.median(ratios):.2f} ({quantile(ratios, 0.05):.2f} to {quantile(ratios, 0.95):.2f}), "

@@ -220,7 +220,7 @@ void print(const Condition& condition, const Vehicle& of, const char* manoeuvre,
   const double mg_per_kg_m = 1e6 / params.vehicle.propeller_radius_m;
   std::uint32_t truth = 0;
   std::string named;
-  std::vector<double> grown_mg;
+  std::vector<double> true_mg;
   std::vector<double> felt_m_s2;
   std::vector<double> reading_mg;
   std::vector<double> low_mg;
@@ -234,7 +234,8 @@ void print(const Condition& condition, const Vehicle& of, const char* manoeuvre,
       named += text;
     }
     const double grown_kg_m = flight.unbalance_kg_m[i] - learned.natural_kg_m[i];
-    grown_mg.push_back(mg_per_kg_m * grown_kg_m);
+    // What the reading is of: without a calibration, of the whole unbalance.
+    true_mg.push_back(mg_per_kg_m * (params.has_baseline ? grown_kg_m : flight.unbalance_kg_m[i]));
     felt_m_s2.push_back(grown_kg_m / UnbalanceMonitor::kg_m_per_m_s2(learned.params, i));
     reading_mg.push_back(mg_per_kg_m * judge.reading[i].growth_kg_m);
     low_mg.push_back(mg_per_kg_m * judge.reading[i].low_kg_m);
@@ -242,7 +243,7 @@ void print(const Condition& condition, const Vehicle& of, const char* manoeuvre,
   }
   std::printf("%s;%s;%s;%llu;%s;%s;%s;%s;%s;%s;%s;%s;%.1f;%.1f\n", condition.name, of.name, manoeuvre,
               static_cast<unsigned long long>(seed), numbers_of(truth).c_str(), named.c_str(),
-              joined(grown_mg).c_str(), joined(felt_m_s2).c_str(), joined(reading_mg).c_str(),
+              joined(true_mg).c_str(), joined(felt_m_s2).c_str(), joined(reading_mg).c_str(),
               joined(low_mg).c_str(), joined(high_mg).c_str(),
               std::isnan(judge.ambiguous_s) ? "" : numbers_of(judge.candidates).c_str(), judge.judged_s,
               judge.confounded_s);

@@ -57,7 +57,7 @@ enum class UnbalanceNotJudged : std::uint8_t {
   kConfounded,         ///< turns too much like another rotor
 };
 
-/// The growth of one rotor as a mass times radius. kg·m.
+/// The growth of one rotor as a mass times radius; without a baseline the whole of its unbalance. kg·m.
 struct UnbalanceReading {
   double growth_kg_m = 0.0;
   double sigma_kg_m = 0.0;

@@ -55,7 +55,7 @@ Calibration quad_calibration() {
   calibration.response = 2.0;
   calibration.has_trial_mass = true;
   calibration.against_ratio = 0.2;
-  for (int i = 0; i < 4; ++i) calibration.rotors.push_back({0.1 * i, 0.03, 0.5, -0.005});
+  for (int i = 0; i < 4; ++i) calibration.rotors.push_back({0.1 * i, 0.03, 0.5, -0.005, 0.04});
   return calibration;
 }
 
@@ -119,6 +119,7 @@ TEST_F(UnbalanceConfigTest, ACalibrationComesBackAsItWasWritten) {
   EXPECT_EQ(config->monitor.response, 2.0);
   EXPECT_EQ(config->monitor.baseline_m_s2[3], 0.3);
   EXPECT_EQ(config->monitor.speed_error_ratio[2], -0.005);
+  EXPECT_EQ(config->monitor.response_sigma_ratio[1], 0.04);
   // Twice the response: the same mass shakes twice as much, and the same power means a quarter of the mass squared.
   const double speed2 = 0.69 * 9.81 / (4.0 * 7.64e-6);
   EXPECT_NEAR(config->monitor.smallest_m_s2, 2.0 * 15e-6 * 0.1 * speed2 / 0.69, 1e-9);
@@ -133,7 +134,7 @@ TEST_F(UnbalanceConfigTest, ACalibrationThatDoesNotFitIsRefused) {
   write("calibration.toml", to_toml(foreign));
   EXPECT_EQ(error_of(text), "unbalance.toml:2:1: calibration: is of vehicle \"hexa\", not of \"medium\"");
   Calibration larger = quad_calibration();
-  larger.rotors.push_back({0.1, 0.1, 0.0, 0.0});
+  larger.rotors.push_back({0.1, 0.1, 0.0, 0.0, 0.25});
   write("calibration.toml", to_toml(larger));
   EXPECT_EQ(error_of(text),
             "unbalance.toml:2:1: calibration: is for 5 rotors, the vehicle has 4. Calibrate again.");

@@ -107,6 +107,11 @@ TEST_F(UnbalanceServiceTest, NamesTheRotorThatLostABitOfItsPropeller) {
   EXPECT_THAT(event.summary, HasSubstr("mg at the tip"));
   EXPECT_THAT(event.summary, HasSubstr("not calibrated"));
   for (const fault_event_t& one : events_) EXPECT_EQ(one.component, "rotor 4");
+  EXPECT_NEAR(evidence(3, "tip_mass_growth"), 10.0 * evidence(3, "growth"), 1e-6) << "g·mm at 100 mm";
+  // Not calibrated, so with the propeller's own unbalance.
+  EXPECT_GT(evidence(3, "tip_mass_growth_low"), 0.4 * kDamage_mg);
+  EXPECT_LT(evidence(3, "tip_mass_growth_low"), 0.7 * evidence(3, "tip_mass_growth"));
+  EXPECT_GT(evidence(3, "tip_mass_growth_high"), kDamage_mg);
   ASSERT_EQ(status_.active.size(), 1U);
 }
 
