@@ -231,7 +231,7 @@ def write(rows, kept, newest, commit):
         "second fold it to 42 Hz, among the motion of the vehicle: 8 % of the amplitude. Its healthy propellers cannot be judged (the",
         "status says that the inertial data are unfit, and `airworthy calibrate unbalance` refuses), so that it flies uncalibrated",
         "there: readings are of the whole unbalance, and a healthy propeller beyond 0.9 m/s² is reported if it is",
-        "seen. Damage of 8 m/s² is told all the same. The larger vehicles turn at 75 to 80 Hz, of which the average",
+        "seen (seed 2, 2.4 m/s²: the wrong rotor here and, for the same reason, at 50 Hz). Damage of 8 m/s² is told all the same. The larger vehicles turn at 75 to 80 Hz, of which the average",
         "leaves 79 %: they lose nothing but some time.", "",
         *kept_no_speeds(no_speeds, kept),
         "## Rotors of one speed", "",
