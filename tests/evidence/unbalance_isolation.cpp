@@ -54,6 +54,8 @@ struct Condition {
 };
 constexpr std::array kConditions{
     Condition{.name = "healthy", .is_damaged = false},
+    Condition{.name = "in_phase", .angle_rad = 0.0},
+    Condition{.name = "in_phase_trial_mass", .has_trial = true, .angle_rad = 0.0},
     Condition{.name = "damaged"},
     Condition{.name = "trial_mass", .has_trial = true},
     Condition{.name = "mid_flight", .onset_s = 20.0},
