@@ -53,6 +53,8 @@ class Hover {
   double step_s = kStep_s;
   std::optional<LossEvent> event;
 
+  void jump(double seconds) { time_s_ += seconds; }
+
   void fly(double seconds) {
     const auto matrix = params().effectiveness.per_speed2;
     for (double t = 0.0; t < seconds && !event; t += step_s) {
@@ -237,6 +239,21 @@ TEST(EffectivenessMonitor, RefusesWhatIsNoNumberAndTimesThatGoBack) {
   hover.fly(3.0);
   EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
   EXPECT_FALSE(hover.event);
+}
+
+TEST(EffectivenessMonitor, AClockThatJumpsForwardBlamesNobody) {
+  for (const double seconds : {0.3, 5.0, 3600.0}) {
+    Hover hover;
+    hover.fly(10.0);
+    hover.jump(seconds);
+    hover.fly(10.0);
+    EXPECT_FALSE(hover.event) << seconds;
+    EXPECT_EQ(hover.monitor.muted(), Muted::kNot) << seconds;
+    hover.effectiveness[1] = 0.0;
+    hover.fly(0.2);
+    ASSERT_TRUE(hover.event) << seconds;
+    EXPECT_EQ(hover.event->rotor, 1U) << seconds;
+  }
 }
 
 TEST(EffectivenessMonitor, UsesNoHeap) {

@@ -426,6 +426,21 @@ TEST(RotorUnbalanceMonitor, NotANumberBlamesNobodyAndIsCounted) {
   EXPECT_TRUE(std::isfinite(flight.monitor.rotors()[0].amplitude_m_s2));
 }
 
+TEST(RotorUnbalanceMonitor, AClockThatJumpsForwardBlamesNobody) {
+  for (const double seconds : {0.3, 5.0, 3600.0}) {
+    Flight flight;
+    flight.fly(20.0);
+    flight.time_s += seconds;
+    flight.next_report_s = flight.time_s;
+    flight.fly(20.0);
+    EXPECT_EQ(flight.blamed, 0U) << seconds;
+    EXPECT_FALSE(flight.is_ambiguous) << seconds;
+    flight.damage[2] = 3.0;
+    flight.fly(20.0);
+    EXPECT_EQ(flight.blamed, 1U << 2) << seconds;
+  }
+}
+
 TEST(RotorUnbalanceMonitor, KnowsTheMassOfAnAmplitude) {
   const UnbalanceParams params = params_with_baseline();
   // 40 mg at 0.1 m: m·r·ω²/M.
