@@ -209,6 +209,7 @@ bool FlightPhase::has_left_the_ground(double dt_s) noexcept {
 }
 
 Phase FlightPhase::next(double dt_s) noexcept {
+  if (!has_thrust_ || phase_ != Phase::kUnknown) carried_.reset();
   if (!has_thrust_) return by_report();
   const double g = kGravity_m_s2;
   const double thrust = thrust_m_s2();

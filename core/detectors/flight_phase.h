@@ -43,14 +43,15 @@ enum class LandedReport : std::uint8_t { kUnknown, kOnGround, kInAir, kTakingOff
 ///   from        to         when                                                                 order = priority
 ///   any         Contact    |r| > 2 g + Ω²·5 cm, or |r| > 0.7 g while thrust is low and it moves
 ///   any         OnGround   |r| > 0.4 g, f < 0.4 g, still, for 0.25 s
-///   Unknown     InFlight   |r_up| < 0.3 g and f > 0.6 g for 2 s, for 0.25 s if reported in the air; v > 0.4 m/s
+///   Unknown     InFlight   |r_up| < 0.3 g, f > 0.6 g for 2 s, 0.25 s if reported in the air; or as TakeOff
 ///   OnGround    TakeOff    f > 0.35 g, or in the air by (4) or free fall
 ///   TakeOff     InFlight   v > 0.4 m/s and |r_up| < 0.35 g; reported climb > 0.5 m/s; for 0.1 s
 ///   Contact     InFlight   free fall for 0.1 s
 ///   Contact     Landing    |r| < 0.35 g for 0.5 s, with thrust
 ///   InFlight    Landing    touch-down: r_up rises by > 0.35 g within 0.3 s; r_up > 0.3 g; reported landing
 ///   Landing     InFlight   v > 0.4 m/s again, or 1.5 s without a sign of the ground, unless landing is reported
-/// Without any knowledge of the thrust for 0.5 s the autopilot's report is followed, and Unknown without it.
+/// Without any knowledge of the thrust for 0.5 s the autopilot's report is followed, and Unknown without it. Begun on
+/// the ground with rotors that give more than 0.7 g, it takes 2 s of that for flight: nothing else tells them apart.
 ///
 /// Operating point (tests/sim/flight_phase_test.cpp, hard realism): 100 landings and take-offs of six vehicles,
 /// with and without reports.
