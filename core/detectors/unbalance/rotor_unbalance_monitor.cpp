@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "core/detectors/unbalance/rigid_body_response.h"
@@ -265,7 +266,10 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     }
     const double baseline = rotor.amplitude_m_s2 - rotor.growth_m_s2;
     const double baseline_sigma = params_.has_baseline ? params_.baseline_sigma_m_s2[k] : 0.0;
-    read_mass(k, steady_[k].amplitude_m_s2() - baseline, std::hypot(steady_[k].sigma_m_s2(), baseline_sigma));
+    const bool is_steady = steady_[k].has_value();
+    const double amplitude = is_steady ? steady_[k].amplitude_m_s2() : rotor.amplitude_m_s2;
+    const double sigma = is_steady ? steady_[k].sigma_m_s2() : rotor.sigma_m_s2;
+    read_mass(k, amplitude - baseline, std::hypot(sigma, baseline_sigma));
   }
 }
 
@@ -277,10 +281,12 @@ void RotorUnbalanceMonitor<N>::read_mass(std::size_t rotor, double growth_m_s2, 
   const double high = growth_m_s2 + kSigmas * sigma_m_s2;
   const double more = 1.0 + kSigmas * ratio;  // of the response than was assumed: the mass is less
   const double less = 1.0 - kSigmas * ratio;
-  rotor_[rotor].reading = {.growth_kg_m = kg_m * growth_m_s2,
-                           .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2),
-                           .low_kg_m = kg_m * low / (low > 0.0 ? more : less),
-                           .high_kg_m = kg_m * high / (high > 0.0 ? less : more)};
+  UnbalanceReading& reading = rotor_[rotor].reading;
+  reading = {.growth_kg_m = kg_m * growth_m_s2,
+             .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2)};
+  if (rotor_[rotor].reason != UnbalanceNotJudged::kJudged) return;  // no interval
+  reading.low_kg_m = kg_m * low / (low > 0.0 ? more : less);
+  reading.high_kg_m = kg_m * high / (high > 0.0 ? less : more);
 }
 
 template <std::size_t N>
@@ -453,6 +459,7 @@ template <std::size_t N>
 void RotorUnbalanceMonitor<N>::mute(UnbalanceNotJudged reason, TimePoint now) noexcept {
   for (std::size_t i = 0; i < N; ++i) {
     rotor_[i].reason = reason;
+    rotor_[i].reading.low_kg_m = rotor_[i].reading.high_kg_m = std::numeric_limits<double>::quiet_NaN();
     rotor_[i].test_ratio = 0.0;
     rotor_[i].log_odds = 0.0;
     grown_[i].step(false, now);

@@ -25,6 +25,8 @@ class SteadyAmplitude {
     sigma_m_s2_ = sigma_m_s2 / std::sqrt(std::max(1.0, age_s_ / kErrorsLast_s));
   }
 
+  /// False before the first add() and after restart(): the rest means nothing.
+  [[nodiscard]] bool has_value() const noexcept { return age_s_ > 0.0; }
   [[nodiscard]] double amplitude_m_s2() const noexcept { return std::sqrt(std::max(0.0, power_)); }
   [[nodiscard]] double sigma_m_s2() const noexcept { return sigma_m_s2_; }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/detectors/detector_state.h"
@@ -61,8 +62,10 @@ enum class UnbalanceNotJudged : std::uint8_t {
 struct UnbalanceReading {
   double growth_kg_m = 0.0;
   double sigma_kg_m = 0.0;
-  double low_kg_m = 0.0;  ///< the truth is between low and high in 95 % of the flights
-  double high_kg_m = 0.0;
+  /// The truth is between low and high in 95 % of the flights with rotor speeds, if the vehicle's mass is right to 10 %.
+  /// Not a number while the rotor is not judged.
+  double low_kg_m = std::numeric_limits<double>::quiet_NaN();
+  double high_kg_m = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What is known of the unbalance of one rotor.
