@@ -24,7 +24,8 @@ struct UnbalanceParams {
   double usual_m_s2 = 0.5;            ///< of propellers nobody has measured
   std::array<double, kMaxRotors> baseline_m_s2{};
   std::array<double, kMaxRotors> baseline_sigma_m_s2{};
-  std::array<double, kMaxRotors> baseline_power{};  ///< of the signal-power filter, (U/U₀)²
+  std::array<double, kMaxRotors>
+      baseline_power_m2_s4{};  ///< UnbalancePowers of healthy flights; zeros = none
   double response = 1.0;  ///< acceleration felt / that of a rigid body, mean of x and y, near the rotor speed
   /// 1σ of response·Gᵢ over vehicle mass, of itself. Before a trial mass has measured it: that an airframe answers one axis
   /// more than the other by half again and more (Bebop 2: 1.6), and a battery or payload that the file does not tell.
@@ -63,7 +64,7 @@ struct UnbalanceReading {
   double growth_kg_m = 0.0;
   double sigma_kg_m = 0.0;
   /// The truth is between low and high in 95 % of the flights with rotor speeds, if the vehicle's mass is right to 10 %.
-  /// Not a number while the rotor is not judged.
+  /// Not a number while the rotor is not judged; infinite where the response may be next to nothing.
   double low_kg_m = std::numeric_limits<double>::quiet_NaN();
   double high_kg_m = std::numeric_limits<double>::quiet_NaN();
 };
@@ -93,6 +94,13 @@ struct UnbalanceInnovation {
   std::int64_t samples_refused = 0;
   std::int64_t speeds_refused = 0;
   std::array<double, kMaxRotors> speed_error_ratio{};  ///< as learned
+};
+
+/// What the signal-power filter has learned of the rotors, for a calibration.
+struct UnbalancePowers {
+  std::array<double, kMaxRotors>
+      m2_s4{};             ///< squares of amplitudes at hover speed; noise may make one negative
+  double learned_s = 0.0;  ///< the time that they rest upon
 };
 
 /// The policy of rotor unbalance over order tracking: who is out of balance, by how much, how sure. Without usable
@@ -129,8 +137,7 @@ class UnbalanceMonitor {
   [[nodiscard]] virtual std::uint32_t candidates() const noexcept = 0;
   [[nodiscard]] virtual TimePoint ambiguous_since() const noexcept = 0;
   [[nodiscard]] virtual UnbalanceInnovation innovation() const noexcept = 0;
-  /// What the signal-power filter has learned of each rotor, (U/U₀)²: UnbalanceParams::baseline_power for a calibration.
-  [[nodiscard]] virtual std::array<double, kMaxRotors> powers() const noexcept = 0;
+  [[nodiscard]] virtual UnbalancePowers powers() const noexcept = 0;
 
   /// Mass times radius that makes an amplitude of 1 m/s² at hover speed, felt in the centre of mass. kg·m.
   [[nodiscard]] static double kg_m_per_m_s2(const UnbalanceParams& params) noexcept;

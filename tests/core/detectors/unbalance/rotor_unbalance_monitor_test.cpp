@@ -310,6 +310,24 @@ TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
   EXPECT_GT(measured.monitor.rotors()[1].reading.high_kg_m, truth);
 }
 
+TEST(RotorUnbalanceMonitor, AResponseThatMayBeNextToNothingLeavesTheMassOpen) {
+  UnbalanceParams params = params_with_baseline();
+  params.response_sigma_ratio.fill(0.6);
+  Flight flight{params};
+  flight.damage[1] = 2.0;
+  flight.fly(20.0);
+  const UnbalanceReading& reading = flight.monitor.rotors()[1].reading;
+  EXPECT_EQ(reading.high_kg_m, std::numeric_limits<double>::infinity());
+  EXPECT_GT(reading.sigma_kg_m, 0.6 * reading.growth_kg_m);
+  EXPECT_GT(reading.low_kg_m, 0.0);
+  EXPECT_LT(reading.low_kg_m, reading.growth_kg_m / 2.2);
+
+  Flight mended{params};
+  mended.natural[3] = 0.0;
+  mended.fly(20.0);
+  EXPECT_EQ(mended.monitor.rotors()[3].reading.low_kg_m, -std::numeric_limits<double>::infinity());
+}
+
 TEST(RotorUnbalanceMonitor, WhatWasFoundStaysFoundInAStillHover) {
   Flight flight;
   flight.damage[1] = 3.0;
