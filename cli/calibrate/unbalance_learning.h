@@ -37,7 +37,7 @@ inline constexpr double kLeastJudged_s = 20.0;
 ///   Motor lag  median over the flights of fit_motor_lag(), for the time without rotor speeds
 ///   Power      mean of UnbalancePowers over the flights with enough of it, for the time without rotor speeds
 ///   Baseline   mean amplitude of each rotor; sigma: of single judgements around it, flights pooled              (3)
-///   Response   a trial mass m at radius r makes response·G·m·r·ω₀²/M, G of rigid_body_response.h. Of trials with the
+///   Response   a trial mass m at radius r makes response·B·m·r·ω₀²/M, B of rigid_body_response.h. Of trials with the
 ///              mass once on either blade its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b; of one
 ///              trial it is a² − b² on average over that phase. Sigma of each rotor: of the trial's amplitudes (for one
 ///              trial b/√2 as well), and of carrying it from the rotor of the trial to this one                    (4)

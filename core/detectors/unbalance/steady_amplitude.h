@@ -5,7 +5,8 @@
 
 namespace airworthy {
 
-/// The amplitude of one rotor over the time since it last changed: for a mass, where the newest half second is for alarms.
+/// The amplitude of one rotor over the time since it last changed: for a mass, where the newest half second is for
+/// alarms.
 ///   Power      p ← p + Δt/min(t, T)·(|Â|² − 2σ² − p),  t the time since a change, T = 20 s                     (1)
 ///   Sigma      σ/√max(1, min(t, T)/τ): errors of the tracker last for about τ = 1.6 s                          (2)
 ///   Change     newest amplitude, of the last t₀ = 0.5 s, more than 3σ from √p: p its square, t = t₀              (3)
