@@ -49,8 +49,8 @@ class PowerFallback {
 
   /// Ignores what is older than the last command, or far ahead of the inertial data.
   void on_commands(TimePoint time, std::span<const double, N> command_ratio) noexcept {
-    if (!has_sample_ || to_seconds(time - sampled_at_) > kCommandsFresh_s) return;
-    if (has_commands_ && time < commanded_at_) return;
+    if (is_far_ahead(time)) return;
+    if (has_commands_ && time < commanded_at_ && !is_far_ahead(commanded_at_)) return;
     for (std::size_t i = 0; i < N; ++i) {
       if (!std::isfinite(command_ratio[i])) return;
     }
@@ -91,6 +91,11 @@ class PowerFallback {
   [[nodiscard]] double learned_s() const noexcept { return ekf_.learned_s(); }
 
  private:
+  /// Of the inertial data, if there are any yet.
+  [[nodiscard]] bool is_far_ahead(TimePoint time) const noexcept {
+    return has_sample_ && to_seconds(time - sampled_at_) > kCommandsFresh_s;
+  }
+
   using Ekf = SignalPowerEkf<double, N, RotorBands<double, N>>;
 
   Multirotor vehicle_;

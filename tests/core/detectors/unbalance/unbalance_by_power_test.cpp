@@ -215,6 +215,13 @@ TEST(UnbalanceByPower, AnOlderCommandIsIgnored) {
   EXPECT_FALSE(fallback.has_fresh_commands(at(10.6)));
 }
 
+TEST(UnbalanceByPower, ACommandOfTheFutureAheadOfAllInertialDataDoesNoHarm) {
+  Flight flight;
+  flight.monitor.on_commands(at(3600.0), std::array{0.5, 0.5, 0.5, 0.5});
+  flight.fly(10.0);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+}
+
 TEST(UnbalanceByPower, WhatAveragingTakesAwayIsGivenBack) {
   Flight flight;
   flight.window_s = 0.005;  // leaves 79 % at hover speed
