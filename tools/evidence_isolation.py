@@ -124,17 +124,23 @@ def alike_table(rows, kept, commit):
             start = f"| {mass}{times} |"
             same = [row for row in rows if (row["condition"], row["vehicle"]) == (condition, vehicle)]
             if not same:
-                yield from [line for line in kept if line.startswith(start)]
+                old = [line for line in kept if line.startswith(start)]
+                if any(line.count("|") != ALIKE_HEADER[0].count("|") for line in old):
+                    raise Failed(f"{PAGE}: the row '{start}' has other columns: fly it again, --rows {' '.join(ALIKE)}")
+                yield from old
                 continue
             seen = [row for row in same if row["seen"]]
+            hidden = [row for row in same if not row["seen"]]
             wrong = sum(bool(set(row["named"]) - row["truth"]) for row in same)
             named = sum(bool(row["named"]) for row in same)
-            several = [row for row in same if len(row["candidates"]) > 1]
+            several = [row for row in seen if len(row["candidates"]) > 1]
+            hidden_several = sum(len(row["candidates"]) > 1 for row in hidden)
             listed = sum(row["truth"] <= row["candidates"] for row in several)
             one = sum(len(row["candidates"]) == 1 for row in same)
             cannot = sum(row["confounded_s"] for row in same) / sum(row["judged_s"] for row in same)
             size = f"{statistics.mean(len(row['candidates']) for row in several):.1f}" if several else "–"
             yield (f"{start} {len(same)} | {named}, {wrong} | {one} | {len(several)} of {len(seen)} | {listed} | {size} | "
+                   f"{hidden_several} of {len(hidden)} | "
                    f"{100 * cannot:.1f} % | {commit} |")
 
 
@@ -175,6 +181,10 @@ def jobs_of(chosen, vehicles, seeds):
 
 HEADER = ["| experiment | manoeuvre | vehicle | flights | r / w / p / – | amb. | s | reading / true | stated, holds | hidden, w | commit |",
           "|---|---|---|--:|--:|--:|--:|--:|--:|--:|---|"]
+
+
+ALIKE_HEADER = ["| vehicle | flights | named, wrong | one listed | reported | with it | listed | hidden | cannot isolate | commit |",
+                "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|"]
 
 
 def unbalance(arguments):
@@ -223,8 +233,8 @@ def write(rows, kept, newest, commit):
         "  is inside.", "",
         *HEADER, *table(rows, CONDITIONS, kept.get("", []), commit), "",
         "The accelerometer is not in the centre of mass, and the force at a hub turns the vehicle: on the 39 g vehicle what is felt of a",
-        "rotor differs by up to 16 % of an axis for that alone. `rigid_body_response.h` takes that from the vehicle file; before,",
-        "readings after a trial on rotor 1 were low by 6 to 12 % on every other rotor. What is left is how unevenly the",
+        "rotor differs by up to 16 % of an axis for that alone. `rigid_body_response.h` takes that from the vehicle file; without it",
+        "readings after a trial on rotor 1 would be low by 6 to 12 % on every other rotor. What is left is how unevenly the",
         "airframe answers its axes, which is in the stated interval. Without a trial mass the reading carries the error of the",
         "vehicle file: at *hard* the airframe answers with 30 % more or less in either axis and the mass is 10 % off. Two flights",
         "with a known mass, once on either blade (`airworthy calibrate unbalance --trial`), measure both.", "",
@@ -246,10 +256,9 @@ def write(rows, kept, newest, commit):
         "- named, wrong: flights in which one rotor was blamed; the wrong one. *one listed*: an unbalance reported with a single rotor.",
         "- reported: flights in which an unbalance was reported that may be one of several rotors, of those with growth above",
         f"  {SEEN_M_S2:g} m/s². *with it*: of the reported, those whose list has the damaged rotor. *listed*: rotors listed, mean.",
+        "- hidden: the same reports of flights whose damage makes up for the propeller's own unbalance, of all such flights.",
         "- cannot isolate: share of the time in which the status says so, with the rotors that turn alike.", "",
-        "| vehicle | flights | named, wrong | one listed | reported | with it | listed | cannot isolate | commit |",
-        "|---|--:|--:|--:|--:|--:|--:|--:|---|",
-        *alike_table(rows, kept.get("## Rotors of one speed", []), commit), "",
+        *ALIKE_HEADER, *alike_table(rows, kept.get("## Rotors of one speed", []), commit), "",
         "Five times the damage shakes the 690 g vehicle so that its rate loop drives the two senses at speeds up to 8 rad/s apart, and",
         "those of one sense at some 0.3 rad/s: a rotor named there was named in the first seconds of such a flight. A list without",
         "the damaged rotor is of the other sense: an airframe more uneven than its baselines showed.", "",

@@ -12,6 +12,8 @@
 #include <span>
 #include <thread>
 
+#include "cli/calibrate/median.h"
+
 namespace airworthy::calibrate {
 namespace {
 
@@ -34,12 +36,6 @@ std::set<std::string> groups_of(const Flights& flights) {
   std::set<std::string> groups;
   for (const HealthyFlight* flight : flights) groups.insert(flight->group);
   return groups;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct Fit {

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "cli/calibrate/learning.h"
+#include "cli/calibrate/median.h"
 #include "cli/calibrate/motor_lag_fit.h"
 #include "cli/eval/flight_run.h"
 #include "core/detectors/unbalance/rigid_body_response.h"
@@ -40,7 +41,7 @@ struct FlightRecord {
   std::vector<RotorRecord> rotors;
   std::vector<Series> speeds;                          ///< reports of each rotor in rev/min, in flight
   std::vector<Series> commands;                        ///< of each rotor, in flight
-  std::array<double, kMaxRotors> powers{};             ///< of the signal-power filter at the end
+  UnbalancePowers powers;                              ///< at the end
   std::array<double, kMaxRotors> speed_error_ratio{};  ///< at the end
   std::int64_t judgements = 0;
   UnbalanceNotJudged last_reason = UnbalanceNotJudged::kNotFlying;
@@ -56,7 +57,7 @@ struct FlightRecord {
 
 struct Judgement {
   TimePoint time;
-  std::array<double, kMaxRotors> powers;
+  UnbalancePowers powers;
   std::array<double, kMaxRotors> speed_error_ratio;
   std::vector<RotorUnbalance> rotors;
 };
@@ -164,12 +165,6 @@ rt::Expected<std::vector<FlightRecord>> read_flights(const std::vector<std::stri
 
 double mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct Amplitude {
@@ -380,6 +375,17 @@ rt::Expected<void> learn_response(const std::vector<TrialFlight>& trials, const 
 
 }  // namespace
 
+std::array<double, kMaxRotors> mean_powers(const std::vector<UnbalancePowers>& flights) {
+  std::array<double, kMaxRotors> mean{};
+  const auto taught = std::count_if(flights.begin(), flights.end(),
+                                    [](const auto& one) { return one.learned_s >= kLeastJudged_s; });
+  for (const UnbalancePowers& one : flights) {
+    if (one.learned_s < kLeastJudged_s) continue;
+    for (std::size_t i = 0; i < kMaxRotors; ++i) mean[i] += one.m2_s4[i] / static_cast<double>(taught);
+  }
+  return mean;
+}
+
 rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& logs,
                                                const std::vector<TrialFlight>& trials,
                                                const UnbalanceConfig& config, unsigned jobs) {
@@ -420,6 +426,9 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
   for (const FlightRecord& flight : *flights) {
     calibration.judged_s += static_cast<double>(flight.judgements) * to_seconds(UnbalanceMonitor::kPeriod);
   }
+  std::vector<UnbalancePowers> powers;
+  for (const FlightRecord& flight : *flights) powers.push_back(flight.powers);
+  const auto powers_m2_s4 = mean_powers(powers);
   double power = 0.0;
   double against = 0.0;
   for (std::size_t i = 0; i < rotors; ++i) {
@@ -429,11 +438,7 @@ rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& l
     for (const double a : all.amplitude_m_s2) {
       variance += (a - baseline) * (a - baseline) / static_cast<double>(all.amplitude_m_s2.size());
     }
-    double filter_power = 0.0;
-    for (const FlightRecord& flight : *flights) {
-      filter_power += flight.powers[i] / static_cast<double>(flights->size());
-    }
-    calibration.rotors.push_back({baseline, std::sqrt(variance), filter_power,
+    calibration.rotors.push_back({baseline, std::sqrt(variance), powers_m2_s4[i],
                                   tuned.monitor.speed_error_ratio[i],
                                   config.monitor.response_sigma_ratio[i]});
     learned.smallest_growth_m_s2.push_back(config.monitor.smallest_m_s2 +

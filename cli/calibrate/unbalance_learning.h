@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -26,14 +26,18 @@ struct LearnedUnbalance {
 /// Less of judged flight says too little about a rotor.
 inline constexpr double kLeastJudged_s = 20.0;
 
+/// In m²/s⁴, over the flights that have taught the signal-power filter for kLeastJudged_s; zeros without one.
+[[nodiscard]] std::array<double, kMaxRotors> mean_powers(const std::vector<UnbalancePowers>& flights);
+
 /// Learns the balance of a vehicle's propellers from healthy flights (of a flight with a GROUND_TRUTH fault, the part
 /// before it).
 ///   Latency    of the telemetry: of 0, 4, … 60 ms the one for which the tracked power of all rotors is largest     (1)
 ///   Noise      of a report: 1.4826·median|ωₖ₋₁ − 2ωₖ + ωₖ₊₁|/√6 over the speed                                  (2)
 ///   Clocks     of the motor controllers: where SpeedScale ends, median over the flights
 ///   Motor lag  median over the flights of fit_motor_lag(), for the time without rotor speeds
+///   Power      mean of UnbalancePowers over the flights with enough of it, for the time without rotor speeds
 ///   Baseline   mean amplitude of each rotor; sigma: of single judgements around it, flights pooled              (3)
-///   Response   a trial mass m at radius r makes response·G·m·r·ω₀²/M, G of rigid_body_response.h. Of trials with the
+///   Response   a trial mass m at radius r makes response·B·m·r·ω₀²/M, B of rigid_body_response.h. Of trials with the
 ///              mass once on either blade its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b; of one
 ///              trial it is a² − b² on average over that phase. Sigma of each rotor: of the trial's amplitudes (for one
 ///              trial b/√2 as well), and of carrying it from the rotor of the trial to this one                    (4)

@@ -158,8 +158,9 @@ int run(int argc, char** argv) {
           {"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}}));
   app.add_flag(
       "--rotors-alike", options.rotors_alike,
-      "no wind, motors and propellers without differences, mass in the middle: in a hover all rotors turn "
-      "at one speed");
+      "no wind, no difference between motors or propellers but their unbalance, thrust axes upright, mass in "
+      "the middle, gyro without bias or drift, an estimate without noise: in a hover all rotors turn at one "
+      "speed");
   app.add_option("--seed", options.seed, "of all random numbers; default 1")->check(CLI::NonNegativeNumber);
   app.add_option(
          "--vehicle-seed", options.vehicle_seed,

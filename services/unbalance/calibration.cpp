@@ -33,7 +33,7 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
   for (ConfigTable rotor : root.tables("rotor", {.count = Count{3, kMaxRotors}})) {
     calibration.rotors.push_back({rotor.required<double>("baseline_m_s2", kAmplitude),
                                   rotor.required<double>("baseline_sigma_m_s2", kAmplitude),
-                                  rotor.optional<double>("power", 0.0, Range{-1e6, 1e6}),
+                                  rotor.optional<double>("power_m2_s4", 0.0, Range{-1e8, 1e8}),
                                   rotor.optional<double>("speed_error_ratio", 0.0, Range{-0.1, 0.1}),
                                   rotor.optional<double>("response_sigma_ratio", 0.25, Range{0.0, 10.0})});
   }
@@ -71,7 +71,7 @@ rt::Expected<UnbalanceParams> with_calibration(UnbalanceParams params, const Cal
     params.baseline_sigma_m_s2[i] = calibration.rotors[i].baseline_sigma_m_s2;
     params.speed_error_ratio[i] = calibration.rotors[i].speed_error_ratio;
     params.response_sigma_ratio[i] = calibration.rotors[i].response_sigma_ratio;
-    params.baseline_power[i] = calibration.rotors[i].power / (ratio * ratio);
+    params.baseline_power_m2_s4[i] = calibration.rotors[i].power_m2_s4;
   }
   return params;
 }
@@ -98,9 +98,14 @@ std::string to_toml(const Calibration& calibration) {
   for (std::size_t i = 0; i < calibration.rotors.size(); ++i) {
     const Calibration::Rotor& rotor = calibration.rotors[i];
     text += fmt::format(
-        "\n[[rotor]]  # {}\nbaseline_m_s2 = {:.6g}\nbaseline_sigma_m_s2 = {:.6g}\npower = {:.6g}\n"
-        "speed_error_ratio = {:.6g}\nresponse_sigma_ratio = {:.6g}\n",
-        i + 1, rotor.baseline_m_s2, rotor.baseline_sigma_m_s2, rotor.power, rotor.speed_error_ratio,
+        "\n[[rotor]]  # {}\n"
+        "baseline_m_s2 = {:.6g}        # amplitude at hover speed\n"
+        "baseline_sigma_m_s2 = {:.6g}  # of a single judgement around it\n"
+        "power_m2_s4 = {:.6g}          # square of the amplitude by the power of the vibration; 0 = not "
+        "learned\n"
+        "speed_error_ratio = {:.6g}    # true over reported speed, less 1\n"
+        "response_sigma_ratio = {:.6g} # 1 sigma of what a mass on this rotor makes, of itself\n",
+        i + 1, rotor.baseline_m_s2, rotor.baseline_sigma_m_s2, rotor.power_m2_s4, rotor.speed_error_ratio,
         rotor.response_sigma_ratio);
   }
   return text;

@@ -17,7 +17,7 @@ struct Calibration {
   struct Rotor {
     double baseline_m_s2 = 0.0;          ///< amplitude at hover speed, mean over the flights
     double baseline_sigma_m_s2 = 0.0;    ///< of a single judgement around it, between flights included
-    double power = 0.0;                  ///< of the signal-power filter, (U/U₀)²; 0 = not learned
+    double power_m2_s4 = 0.0;            ///< UnbalancePowers, mean over the flights; 0 = not learned
     double speed_error_ratio = 0.0;      ///< true over reported speed, less 1
     double response_sigma_ratio = 0.25;  ///< 1σ of what a mass on this rotor makes, of itself
   };

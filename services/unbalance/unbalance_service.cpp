@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "core/detectors/unbalance/rotor_unbalance_monitor.h"
@@ -95,20 +96,32 @@ std::vector<evidence_t> UnbalanceService::evidence_of(std::size_t index, const R
   const double sigma = rotor.sigma_m_s2;
   const double g_mm_per_m_s2 = kGMm_per_kg_m * UnbalanceMonitor::kg_m_per_m_s2(config_.monitor, index);
   const UnbalanceReading& reading = rotor.reading;
-  return {evidence("unbalance", g_mm_per_m_s2 * rotor.amplitude_m_s2, "g*mm"),
-          evidence("unbalance_sigma", g_mm_per_m_s2 * sigma, "g*mm"),
-          evidence("growth", kGMm_per_kg_m * reading.growth_kg_m, "g*mm"),
-          evidence("growth_sigma", kGMm_per_kg_m * reading.sigma_kg_m, "g*mm"),
-          evidence("tip_mass_growth", mg_per_kg_m_ * reading.growth_kg_m, "mg"),
-          evidence("tip_mass_growth_low", mg_per_kg_m_ * reading.low_kg_m, "mg"),
-          evidence("tip_mass_growth_high", mg_per_kg_m_ * reading.high_kg_m, "mg"),
-          evidence("amplitude", rotor.amplitude_m_s2, "m/s^2"),
-          evidence("information", sigma > 0.0 ? 1.0 / (sigma * sigma) : 0.0, "s^4/m^2"),
-          evidence("by_signal_power", rotor.by_power ? 1.0 : 0.0, "1"),
-          evidence("log_odds", rotor.log_odds, "1"),
-          evidence("test_ratio", rotor.test_ratio, "1"),
-          evidence("nis_mean", innovation.nis, "1"),
-          evidence("innovation_sigma", innovation.noise_m_s2, "m/s^2")};
+  std::vector<evidence_t> all{evidence("unbalance", g_mm_per_m_s2 * rotor.amplitude_m_s2, "g*mm"),
+                              evidence("unbalance_sigma", g_mm_per_m_s2 * sigma, "g*mm"),
+                              evidence("growth", kGMm_per_kg_m * reading.growth_kg_m, "g*mm"),
+                              evidence("growth_sigma", kGMm_per_kg_m * reading.sigma_kg_m, "g*mm"),
+                              evidence("tip_mass_growth", mg_per_kg_m_ * reading.growth_kg_m, "mg"),
+                              evidence("tip_mass_growth_low", mg_per_kg_m_ * reading.low_kg_m, "mg"),
+                              evidence("tip_mass_growth_high", mg_per_kg_m_ * reading.high_kg_m, "mg"),
+                              evidence("amplitude", rotor.amplitude_m_s2, "m/s^2"),
+                              evidence("information", sigma > 0.0 ? 1.0 / (sigma * sigma) : 0.0, "s^4/m^2"),
+                              evidence("by_signal_power", rotor.by_power ? 1.0 : 0.0, "1"),
+                              evidence("log_odds", rotor.log_odds, "1"),
+                              evidence("test_ratio", rotor.test_ratio, "1"),
+                              evidence("nis_mean", innovation.nis, "1"),
+                              evidence("innovation_sigma", innovation.noise_m_s2, "m/s^2")};
+  // What is not known is left out: no interval of a rotor that is not judged.
+  all.erase(
+      std::remove_if(all.begin(), all.end(), [](const evidence_t& one) { return !std::isfinite(one.value); }),
+      all.end());
+  return all;
+}
+
+std::string UnbalanceService::interval_of(const UnbalanceReading& reading) const {
+  if (std::isnan(reading.low_kg_m)) return "";
+  const double low_mg = mg_per_kg_m_ * std::max(0.0, reading.low_kg_m);
+  if (std::isinf(reading.high_kg_m)) return fmt::format(", {:.2g} or more", low_mg);
+  return fmt::format(", {:.2g} to {:.2g}", low_mg, mg_per_kg_m_ * reading.high_kg_m);
 }
 
 void UnbalanceService::report_rotor(std::size_t index, const RotorUnbalance& rotor) {
@@ -123,10 +136,8 @@ void UnbalanceService::report_rotor(std::size_t index, const RotorUnbalance& rot
   fault.magnitude_sigma = kGMm_per_kg_m * rotor.reading.sigma_kg_m;
   fault.magnitude_unit = "g*mm";
   fault.onset = rotor.onset;
-  fault.summary = fmt::format("out of balance by {:.2g} g*mm ({:.3g} mg at the tip, {:.2g} to {:.2g}){}",
-                              growth, mg_per_kg_m_ * rotor.reading.growth_kg_m,
-                              mg_per_kg_m_ * std::max(0.0, rotor.reading.low_kg_m),
-                              mg_per_kg_m_ * rotor.reading.high_kg_m,
+  fault.summary = fmt::format("out of balance by {:.2g} g*mm ({:.3g} mg at the tip{}){}", growth,
+                              mg_per_kg_m_ * rotor.reading.growth_kg_m, interval_of(rotor.reading),
                               config_.monitor.has_baseline ? " more than calibrated" : "; not calibrated");
   fault.evidence = evidence_of(index, rotor);
   reporter_.report(index, rotor.transition, monitor_->judged_at(), fault);

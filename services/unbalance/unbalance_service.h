@@ -32,6 +32,8 @@ class UnbalanceService {
   void on_imu(const imu_t& message);
   void on_esc_status(const esc_status_t& message);
   void report_all();
+  /// ", 10 to 20" in mg at the tip; empty if there is none.
+  [[nodiscard]] std::string interval_of(const UnbalanceReading& reading) const;
   void report_rotor(std::size_t index, const RotorUnbalance& rotor);
   void report_ambiguity();
   [[nodiscard]] rt::DetectorReport report() const;

@@ -164,7 +164,7 @@ Learned<N> calibrated(const Multirotor& vehicle, const Condition& condition, std
   if (healthy.judge.least_judged_s() < kLeastJudged_s) healthy = healthy_flight(kLongCalibration_s);
   params.speed_error_ratio = healthy.judge.monitor().innovation().speed_error_ratio;
   params.most_speed_error_ratio = 0.002;
-  params.baseline_power = healthy.judge.monitor().powers();
+  params.baseline_power_m2_s4 = healthy.judge.monitor().powers().m2_s4;
   // Else the command refuses, and the vehicle flies uncalibrated.
   params.has_baseline = healthy.judge.least_judged_s() >= kLeastJudged_s;
   if (!params.has_baseline) return {params, healthy.unbalance_kg_m};

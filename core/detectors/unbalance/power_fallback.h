@@ -31,13 +31,26 @@ class PowerFallback {
         lag_{vehicle.motor_time_constant_s},
         ekf_{params} {}
 
-  /// A new flight.
-  void restart() noexcept {
+  struct Verdict {
+    typename PowerPolicy<N>::Verdict rotors;
+    std::array<Rotors, N>
+        correlation{};  ///< of the errors of two powers; near −1: one can stand for the other
+  };
+
+  /// A new flight; each sample is the mean over `averaging_window_s`.
+  void restart(double averaging_window_s) noexcept {
+    params_.sensor.averaging_window_s = averaging_window_s;
     ekf_ = Ekf{params_};
     policy_.restart();
   }
 
+  /// Nobody asks for now.
+  void pause() noexcept { policy_.restart(); }
+
+  /// Ignores what is older than the last command, or far ahead of the inertial data.
   void on_commands(TimePoint time, std::span<const double, N> command_ratio) noexcept {
+    if (is_far_ahead(time)) return;
+    if (has_commands_ && time < commanded_at_ && !is_far_ahead(commanded_at_)) return;
     for (std::size_t i = 0; i < N; ++i) {
       if (!std::isfinite(command_ratio[i])) return;
     }
@@ -62,20 +75,27 @@ class PowerFallback {
   }
 
   [[nodiscard]] bool has_fresh_commands(TimePoint now) const noexcept {
-    return has_commands_ && to_seconds(now - commanded_at_) < kCommandsFresh_s;
+    return has_commands_ && std::abs(to_seconds(now - commanded_at_)) < kCommandsFresh_s;
   }
   [[nodiscard]] bool is_ready() const noexcept { return ekf_.learned_s() >= PowerPolicy<N>::kLeast_s; }
 
   /// To be asked every `dt_s`.
-  [[nodiscard]] typename PowerPolicy<N>::Verdict judge(double dt_s) noexcept {
+  [[nodiscard]] Verdict judge(double dt_s) noexcept {
     const auto told = ekf_.isolation();
-    return policy_.judge(told.power, told.information, ekf_.learned_s(), dt_s);
+    return {policy_.judge(told.power, told.information, ekf_.learned_s(), dt_s), told.correlation};
   }
 
   /// (Uᵢ/U₀)², for a calibration.
   [[nodiscard]] Rotors powers() const noexcept { return ekf_.isolation().power; }
+  /// What they rest upon.
+  [[nodiscard]] double learned_s() const noexcept { return ekf_.learned_s(); }
 
  private:
+  /// Of the inertial data, if there are any yet.
+  [[nodiscard]] bool is_far_ahead(TimePoint time) const noexcept {
+    return has_sample_ && to_seconds(time - sampled_at_) > kCommandsFresh_s;
+  }
+
   using Ekf = SignalPowerEkf<double, N, RotorBands<double, N>>;
 
   Multirotor vehicle_;

@@ -29,11 +29,10 @@ class PowerPolicy {
     Rotors unbalance_kg_m{};
     Rotors sigma_kg_m{};
     Rotors growth_kg_m{};  ///< over the baseline
-    Rotors evidence{};     ///< log likelihood ratio of the power that is read against that of the baseline
     std::array<bool, N> is_named{};
   };
 
-  /// A new flight.
+  /// A new flight, or nobody asks for a while: what has grown must last anew.
   void restart() noexcept { held_s_.fill(0.0); }
 
   /// `information` is that about the power, 1/σ². To be asked every `dt_s`; `learned_s`: what the powers rest upon.
@@ -43,12 +42,11 @@ class PowerPolicy {
     Rotors least_growth{};
     for (std::size_t i = 0; i < N; ++i) {
       const double sigma = 1.0 / std::sqrt(information[i]);  // infinite where nothing is told
-      const double baseline = baseline_kg_m_[i] / reference_kg_m_;
-      const double above = std::max(0.0, power[i] - baseline * baseline);
+      const double at_least = std::max(0.0, power[i]);       // noise may make a power negative
       verdict.unbalance_kg_m[i] = unbalance_kg_m(power[i]);
       verdict.growth_kg_m[i] = verdict.unbalance_kg_m[i] - baseline_kg_m_[i];
-      verdict.sigma_kg_m[i] = 0.5 * (unbalance_kg_m(power[i] + sigma) - unbalance_kg_m(power[i] - sigma));
-      verdict.evidence[i] = 0.5 * above * above * information[i];
+      const double width = unbalance_kg_m(at_least + sigma) - unbalance_kg_m(at_least - sigma);
+      verdict.sigma_kg_m[i] = at_least > sigma ? 0.5 * width : width;  // at zero there is but one side
       least_growth[i] = unbalance_kg_m(power[i] - kSigmas * sigma) - baseline_kg_m_[i];
     }
     for (std::size_t i = 0; i < N; ++i) {

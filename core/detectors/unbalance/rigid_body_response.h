@@ -8,15 +8,16 @@
 
 namespace airworthy {
 
-/// What an accelerometer beside the centre of mass feels of the unbalance of one rotor, of a rigid body: the force at the
-/// hub turns the vehicle too, and the accelerometer has a lever arm. On a small vehicle this is a sixth of an axis.
-///   Body       a = f/M + (I⁻¹·(r×f))×p,  f = S·(cos θ, s·sin θ, 0),  S = diag(1 + e, 1 − e)                  (1)
-///   Columns    M·a = G·f:  G_xx = 1 + M·(r_z·p_z/I_y + r_y·p_y/I_z),  G_xy = −M·r_x·p_y/I_z,
-///              G_yx = −M·r_y·p_x/I_z,  G_yy = 1 + M·(r_z·p_z/I_x + r_x·p_x/I_z)                               (2)
-///   Response   M·|A₊|/|f| = ½·|G_xx·(1 + e) + G_yy·(1 − e) + j·s·(G_yx·(1 + e) − G_xy·(1 − e))|,
+/// What an accelerometer beside the centre of mass feels of the unbalance of one rotor, of a rigid body: the force
+/// at the hub turns the vehicle too, and the accelerometer has a lever arm. On a small vehicle this is a sixth of an
+/// axis.
+///   Body       a = f/M + (J⁻¹·(c×f))×p,  f = E·(cos θ, s·sin θ, 0),  E = diag(1 + e, 1 − e)                  (1)
+///   Columns    M·a = B·f:  B_xx = 1 + M·(c_z·p_z/J_y + c_y·p_y/J_z),  B_xy = −M·c_x·p_y/J_z,
+///              B_yx = −M·c_y·p_x/J_z,  B_yy = 1 + M·(c_z·p_z/J_x + c_x·p_x/J_z)                               (2)
+///   Response   M·|A₊|/|f| = ½·|B_xx·(1 + e) + B_yy·(1 − e) + j·s·(B_yx·(1 + e) − B_xy·(1 − e))|,
 ///              A₊ the part that turns with the rotor, order_tracker.h (4)                                     (3)
 ///   Source     Newton and Euler; docs/equations/order_tracking.md, "The way to the accelerometer"
-///   Symbols    M → mass_kg; I → inertia_kg_m2; r → hub, p → accelerometer, from the centre of mass [m]; s → spin;
+///   Symbols    M → mass_kg; J → inertia_kg_m2; c → hub, p → accelerometer, from the centre of mass [m]; s → spin;
 ///              e → unevenness, of an airframe that answers x by 1 + e and y by 1 − e
 ///   Frame      body: x forward, y right, z down
 /// 1 for an accelerometer in the centre of mass. Without moments of inertia the vehicle is taken not to turn.

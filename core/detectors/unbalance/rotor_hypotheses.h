@@ -29,11 +29,11 @@ struct UnbalancePrior {
 ///   H₀  z ~ N(0, C),  C = D(b) + P⊕P,  z = (X, Y) of the order tracker, P its covariance               (1)
 ///   Hᵢ  as H₀, but rotor i has the amplitude a, a² = bᵢ² + max(|Âᵢ|, smallest)², instead of bᵢ: C + Eᵢ·Δ·Eᵢᵀ,
 ///       Δ = D(a) − D(bᵢ)                                                                               (2)
-///   ln p(z|Hᵢ)/p(z|H₀) = ½·rᵢᵀ·(Δ⁻¹ + Wᵢᵢ)⁻¹·rᵢ − ½·ln det(I + Δ·Wᵢᵢ),  W = C⁻¹,  r = W·z              (3)
+///   ln p(z|Hᵢ)/p(z|H₀) = ½·wᵢᵀ·(Δ⁻¹ + Wᵢᵢ)⁻¹·wᵢ − ½·ln det(I + Δ·Wᵢᵢ),  W = C⁻¹,  w = W·z              (3)
 ///   Prior   D(a) of one rotor: A₊ ~ N(0, a²), A₋ ~ N(0, (ρ·a)²), complex, independent; X = A₊ + A₋,
 ///           Y = −j·s·(A₊ − A₋)                                                                        (4)
-///   Calibrated  the magnitude b of A₊ is known, its phase is not: with u = Â/|Â|, A₊ ~ N(b·u, σ² along u, ½·b² across),
-///           z less these means; Hᵢ adds a growth g along u, g² = max(||Âᵢ| − bᵢ|, smallest)², to (2): Δ = g²·u·uᵀ, and
+///   Calibrated  the magnitude b of A₊ is known, its phase is not: with u = Â/|Â|, A₊ ~ N(b·u, σ² along u, ½·b²
+///           across), z less these means; Hᵢ adds a growth g along u, g² = max(||Âᵢ| − bᵢ|, smallest)², to (2): Δ = g²·u·uᵀ, and
 ///           ½·(ρ·g)² to A₋. A rotor that has always shaken must not need to shake more to be blamed      (5)
 ///   Source  matrix determinant lemma and Woodbury's identity; docs/equations/order_tracking.md
 /// z is taken for the truth plus an error of P. The filter's own prior draws it towards 0 where nothing is known, and
@@ -80,17 +80,17 @@ class RotorHypotheses {
     }
     BoundedMatrix<Scalar, kSize> W;
     if (!invert_positive_definite(C, W)) return std::nullopt;
-    const Eigen::Matrix<Scalar, kSize, 1> r = W * z;
+    const Eigen::Matrix<Scalar, kSize, 1> w = W * z;
     Verdict verdict;
     for (std::size_t k = 0; k < N; ++k) {
       if (known[k]) continue;
       Block W_i;
-      Column r_i;
+      Column w_i;
       for (int a = 0; a < 4; ++a) {
-        r_i(a) = r(place(k, a));
+        w_i(a) = w(place(k, a));
         for (int b = 0; b < 4; ++b) W_i(a, b) = W(place(k, a), place(k, b));
       }
-      verdict.log_likelihood_ratio[k] = log_ratio(belief[k].growth, W_i, r_i);
+      verdict.log_likelihood_ratio[k] = log_ratio(belief[k].growth, W_i, w_i);
     }
     weigh(known, log(prior.fault_probability), verdict);
     return verdict;
@@ -168,10 +168,10 @@ class RotorHypotheses {
     return belief;
   }
 
-  /// (3) by Gaussian elimination of (I + Δ·W)·q = Δ·r.
-  [[nodiscard]] static Scalar log_ratio(const Block& Delta, const Block& W, const Column& r) noexcept {
+  /// (3) by Gaussian elimination of (I + Δ·W)·q = Δ·w.
+  [[nodiscard]] static Scalar log_ratio(const Block& Delta, const Block& W, const Column& w) noexcept {
     Block M = Block::Identity() + Delta * W;
-    Column q = Delta * r;
+    Column q = Delta * w;
     Scalar log_determinant = 0;
     for (int p = 0; p < 4; ++p) {
       int pivot = p;
@@ -193,7 +193,7 @@ class RotorHypotheses {
     for (int p = 3; p >= 0; --p) {
       for (int column = p + 1; column < 4; ++column) q(p) -= M(p, column) * q(column);
       q(p) /= M(p, p);
-      quadratic += r(p) * q(p);
+      quadratic += w(p) * q(p);
     }
     return static_cast<Scalar>(0.5) * (quadratic - log_determinant);
   }

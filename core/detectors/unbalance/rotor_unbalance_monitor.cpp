@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "core/detectors/unbalance/rigid_body_response.h"
@@ -49,15 +50,20 @@ SignalPowerParams power_params(const UnbalanceParams& params) {
 // it, else what is usual. kg·m.
 template <std::size_t N>
 std::array<double, N> power_baseline(const UnbalanceParams& params) {
-  const auto& power = params.baseline_power;
+  const auto& power = params.baseline_power_m2_s4;
   const bool is_learned = std::any_of(power.begin(), power.end(), [](double value) { return value != 0.0; });
   std::array<double, N> result{};
   for (std::size_t i = 0; i < N; ++i) {
     double amplitude_m_s2 = params.has_baseline ? params.baseline_m_s2[i] : params.usual_m_s2;
-    if (is_learned) amplitude_m_s2 = params.usual_m_s2 * std::sqrt(std::max(0.0, power[i]));
+    if (is_learned) amplitude_m_s2 = std::sqrt(std::max(0.0, power[i]));
     result[i] = amplitude_m_s2 * UnbalanceMonitor::kg_m_per_m_s2(params);
   }
   return result;
+}
+
+bool tells_enough(const RotorUnbalance& rotor, const UnbalanceParams& params) {
+  return rotor.sigma_m_s2 < kLeastInformation * params.smallest_m_s2 ||
+         rotor.amplitude_m_s2 > 4.0 * rotor.sigma_m_s2;
 }
 
 template <std::size_t... kIndex>
@@ -136,18 +142,18 @@ bool RotorUnbalanceMonitor<N>::on_accel(TimePoint time, double a_x_m_s2, double 
   has_accel_ = true;
   // A hard gust may look like a touch-down for a moment: what was learned before is not lost by that.
   const bool flies = phase_ == Phase::kInFlight || (is_tracking_ && phase_ == Phase::kLanding);
+  if (flies) window_s_ = std::isfinite(window_s) ? window_s : 0.0;
   if (flies && !is_tracking_) {
     tracker_.forget();
     estimated_s_ = 0.0;
     power_m2_s4_.fill(0.0);
     against_power_m2_s4_.fill(0.0);
     steady_ = {};
-    fallback_.restart();
+    fallback_.restart(window_s_);
     tracking_since_ = time;
   }
   is_tracking_ = flies;
   if (flies) {
-    window_s_ = std::isfinite(window_s) ? window_s : 0.0;
     fallback_.on_accel(time, a_x_m_s2, a_y_m_s2);
     if (tracker_.on_accel(time, a_x_m_s2, a_y_m_s2, window_s_) == UpdateStatus::kFused) {
       nis_ += 0.002 * (tracker_.innovation().nis() - nis_);
@@ -251,8 +257,7 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     rotor.growth_sigma_m_s2 = params_.has_baseline
                                   ? std::hypot(rotor.sigma_m_s2, params_.baseline_sigma_m_s2[k])
                                   : rotor.sigma_m_s2;
-    const bool is_informed = rotor.sigma_m_s2 < kLeastInformation * params_.smallest_m_s2 ||
-                             rotor.amplitude_m_s2 > 4.0 * rotor.sigma_m_s2;
+    const bool is_informed = tells_enough(rotor, params_);
     rotor.confounded_with = confounded_with(k, is_informed);
     rotor.reason = is_informed && rotor.confounded_with == 0U ? UnbalanceNotJudged::kJudged
                    : !is_informed && gain < kLeastGain        ? UnbalanceNotJudged::kUnfitInertialData
@@ -265,22 +270,31 @@ void RotorUnbalanceMonitor<N>::estimate(double dt_s) noexcept {
     }
     const double baseline = rotor.amplitude_m_s2 - rotor.growth_m_s2;
     const double baseline_sigma = params_.has_baseline ? params_.baseline_sigma_m_s2[k] : 0.0;
-    read_mass(k, steady_[k].amplitude_m_s2() - baseline, std::hypot(steady_[k].sigma_m_s2(), baseline_sigma));
+    const bool is_steady = steady_[k].has_value();
+    const double amplitude = is_steady ? steady_[k].amplitude_m_s2() : rotor.amplitude_m_s2;
+    const double sigma = is_steady ? steady_[k].sigma_m_s2() : rotor.sigma_m_s2;
+    read_mass(k, amplitude - baseline, std::hypot(sigma, baseline_sigma));
   }
 }
 
 template <std::size_t N>
 void RotorUnbalanceMonitor<N>::read_mass(std::size_t rotor, double growth_m_s2, double sigma_m_s2) noexcept {
   const double kg_m = kg_m_per_m_s2(params_, rotor);
-  const double ratio = std::min(params_.response_sigma_ratio[rotor], kMostResponseSigma);
+  const double ratio = params_.response_sigma_ratio[rotor];
   const double low = growth_m_s2 - kSigmas * sigma_m_s2;
   const double high = growth_m_s2 + kSigmas * sigma_m_s2;
-  const double more = 1.0 + kSigmas * ratio;  // of the response than was assumed: the mass is less
-  const double less = 1.0 - kSigmas * ratio;
-  rotor_[rotor].reading = {.growth_kg_m = kg_m * growth_m_s2,
-                           .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2),
-                           .low_kg_m = kg_m * low / (low > 0.0 ? more : less),
-                           .high_kg_m = kg_m * high / (high > 0.0 ? less : more)};
+  // The response may be more than was assumed, so that the mass is less, or less, next to nothing even.
+  const auto by_more = [&](double growth) { return growth / (1.0 + kSigmas * ratio); };
+  const auto by_less = [&](double growth) {
+    constexpr double kAnything = std::numeric_limits<double>::infinity();
+    return ratio > kMostResponseSigma ? std::copysign(kAnything, growth) : growth / (1.0 - kSigmas * ratio);
+  };
+  UnbalanceReading& reading = rotor_[rotor].reading;
+  reading = {.growth_kg_m = kg_m * growth_m_s2,
+             .sigma_kg_m = kg_m * std::hypot(sigma_m_s2, ratio * growth_m_s2)};
+  if (rotor_[rotor].reason != UnbalanceNotJudged::kJudged) return;  // no interval
+  reading.low_kg_m = kg_m * (low < 0.0 ? by_less(low) : by_more(low));
+  reading.high_kg_m = kg_m * (high > 0.0 ? by_less(high) : by_more(high));
 }
 
 template <std::size_t N>
@@ -429,16 +443,24 @@ void RotorUnbalanceMonitor<N>::test_ambiguity(TimePoint now, double log_odds_fau
 template <std::size_t N>
 void RotorUnbalanceMonitor<N>::judge_by_power(TimePoint now, double dt_s) noexcept {
   const double m_s2_per_kg_m = 1.0 / kg_m_per_m_s2(params_);
-  const auto verdict = fallback_.judge(dt_s);
+  const auto [verdict, correlation] = fallback_.judge(dt_s);
   for (std::size_t i = 0; i < N; ++i) {
     RotorUnbalance& rotor = rotor_[i];
     rotor.by_power = true;
-    rotor.reason = UnbalanceNotJudged::kJudged;
     rotor.amplitude_m_s2 = m_s2_per_kg_m * verdict.unbalance_kg_m[i];
+    rotor.against_m_s2 = 0.0;
     rotor.sigma_m_s2 = rotor.growth_sigma_m_s2 = m_s2_per_kg_m * verdict.sigma_kg_m[i];
-    rotor.growth_m_s2 = m_s2_per_kg_m * verdict.growth_kg_m[i];
-    rotor.log_odds = verdict.evidence[i];
-    const bool is_grown = verdict.is_named[i];
+    rotor.growth_m_s2 = params_.has_baseline ? m_s2_per_kg_m * verdict.growth_kg_m[i] : rotor.amplitude_m_s2;
+    rotor.log_odds = 0.0;  // of hypotheses that are not tested here
+    const bool is_informed = tells_enough(rotor, params_);
+    rotor.confounded_with = 0;
+    for (std::size_t j = 0; j < N && !is_informed; ++j) {
+      if (j != i && correlation[i][j] < -kConfounded) rotor.confounded_with |= 1U << j;
+    }
+    rotor.reason = rotor.confounded_with != 0U ? UnbalanceNotJudged::kConfounded
+                   : is_informed               ? UnbalanceNotJudged::kJudged
+                                               : UnbalanceNotJudged::kConverging;
+    const bool is_grown = verdict.is_named[i] && is_informed;
     grown_[i].step(is_grown, now);
     rotor.test_ratio = is_grown || is_known_[i] ? 1.0 : 0.0;
     if (is_grown && !is_known_[i]) rotor.onset = now;
@@ -453,6 +475,7 @@ template <std::size_t N>
 void RotorUnbalanceMonitor<N>::mute(UnbalanceNotJudged reason, TimePoint now) noexcept {
   for (std::size_t i = 0; i < N; ++i) {
     rotor_[i].reason = reason;
+    rotor_[i].reading.low_kg_m = rotor_[i].reading.high_kg_m = std::numeric_limits<double>::quiet_NaN();
     rotor_[i].test_ratio = 0.0;
     rotor_[i].log_odds = 0.0;
     grown_[i].step(false, now);
@@ -480,6 +503,7 @@ void RotorUnbalanceMonitor<N>::judge(TimePoint now) noexcept {
     for (std::size_t i = 0; i < N; ++i) read_mass(i, rotor_[i].growth_m_s2, rotor_[i].growth_sigma_m_s2);
     return;
   }
+  fallback_.pause();
   state_ = reason == UnbalanceNotJudged::kJudged       ? DetectorState::kMonitoring
            : reason == UnbalanceNotJudged::kConverging ? DetectorState::kConverging
                                                        : DetectorState::kMuted;
@@ -509,10 +533,13 @@ UnbalanceInnovation RotorUnbalanceMonitor<N>::innovation() const noexcept {
 }
 
 template <std::size_t N>
-std::array<double, kMaxRotors> RotorUnbalanceMonitor<N>::powers() const noexcept {
-  std::array<double, kMaxRotors> result{};
+UnbalancePowers RotorUnbalanceMonitor<N>::powers() const noexcept {
+  UnbalancePowers result;
   const auto powers = fallback_.powers();
-  std::copy(powers.begin(), powers.end(), result.begin());
+  // U₀ is what shakes with usual_m_s2.
+  const double unit_m2_s4 = params_.usual_m_s2 * params_.usual_m_s2;
+  for (std::size_t i = 0; i < N; ++i) result.m2_s4[i] = powers[i] * unit_m2_s4;
+  result.learned_s = fallback_.learned_s();
   return result;
 }
 

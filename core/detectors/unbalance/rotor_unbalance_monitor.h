@@ -27,7 +27,7 @@ class RotorUnbalanceMonitor final : public UnbalanceMonitor {
   [[nodiscard]] std::uint32_t candidates() const noexcept override { return candidates_; }
   [[nodiscard]] TimePoint ambiguous_since() const noexcept override { return ambiguous_since_; }
   [[nodiscard]] UnbalanceInnovation innovation() const noexcept override;
-  [[nodiscard]] std::array<double, kMaxRotors> powers() const noexcept override;
+  [[nodiscard]] UnbalancePowers powers() const noexcept override;
 
  private:
   using Tracker = OrderTracker<double, N>;

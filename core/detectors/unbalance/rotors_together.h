@@ -12,8 +12,8 @@ namespace airworthy {
 
 /// What a group of rotors that turn alike make together. Nobody can say how much of it is whose; but propellers that
 /// make no more than their baselines never make more together than the sum of these, however they stand to each other.
-///   Sum        A = Σᵢ A₊ᵢ·e^{jθᵢ} over the group, for one sense of rotation; of all its rotors, as the tracker deals the sum
-///              out over those of the other sense too                                                          (1)
+///   Sum        A = Σᵢ A₊ᵢ·e^{jθᵢ} over the group, for one sense of rotation; of all its rotors, as the tracker deals the
+///              sum out over those of the other sense too                                                      (1)
 ///   Variance   of a real part:  ¼·Σᵢⱼ (cos δ·(P_rr + P_ii) + sin δ·(P_ri − P_ir)),  δ = θᵢ − θⱼ,  P of (i, j)  (2)
 ///   Source     order_tracker.h (1), (4); docs/equations/order_tracking.md, "Equal speeds"
 ///   Symbols    A₊ᵢ, θᵢ, P → turning_m_s2(), phase_rad(), covariance_m2_s4() of the tracker; group: bit i = rotor i + 1

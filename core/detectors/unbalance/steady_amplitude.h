@@ -5,7 +5,8 @@
 
 namespace airworthy {
 
-/// The amplitude of one rotor over the time since it last changed: for a mass, where the newest half second is for alarms.
+/// The amplitude of one rotor over the time since it last changed: for a mass, where the newest half second is for
+/// alarms.
 ///   Power      p ← p + Δt/min(t, T)·(|Â|² − 2σ² − p),  t the time since a change, T = 20 s                     (1)
 ///   Sigma      σ/√max(1, min(t, T)/τ): errors of the tracker last for about τ = 1.6 s                          (2)
 ///   Change     newest amplitude, of the last t₀ = 0.5 s, more than 3σ from √p: p its square, t = t₀              (3)
@@ -25,6 +26,8 @@ class SteadyAmplitude {
     sigma_m_s2_ = sigma_m_s2 / std::sqrt(std::max(1.0, age_s_ / kErrorsLast_s));
   }
 
+  /// False before the first add() and after restart(): the rest means nothing.
+  [[nodiscard]] bool has_value() const noexcept { return age_s_ > 0.0; }
   [[nodiscard]] double amplitude_m_s2() const noexcept { return std::sqrt(std::max(0.0, power_)); }
   [[nodiscard]] double sigma_m_s2() const noexcept { return sigma_m_s2_; }
 

@@ -96,7 +96,8 @@ class OrderTracker {
   }
 
   /// A sample of the accelerometer, stamped with the end of its average over `window_s` (0 = raw).
-  /// kNotFinite also for a negative window. kConverging: it waits for the speeds at its time; every sample that no longer waits is fused.
+  /// kNotFinite also for a negative window. kConverging: it waits for the speeds at its time; every sample that no
+  /// longer waits is fused.
   UpdateStatus on_accel(TimePoint time, Scalar a_x_m_s2, Scalar a_y_m_s2, Scalar window_s) noexcept {
     const bool has_window = std::isfinite(window_s) && window_s >= Scalar{0};
     if (!std::isfinite(a_x_m_s2) || !std::isfinite(a_y_m_s2) || !has_window) {

@@ -21,13 +21,14 @@ namespace airworthy {
 ///   Correlation cᵢⱼ = E[yᵢ*·e^{j(θⱼ − φᵢ)}]:  c⁻ = cᵢⱼ·e^{j(sⱼωⱼ − sᵢωᵢ)Δt − εωⱼΔt};  cᵢⱼ ← (1 − κᵢ)·c⁻ + κᵢ·aⱼ   (3)
 ///   Power       gᵢⱼ = E|yᵢ|² of rotor j alone:  gᵢⱼ ← (1 − κᵢ)²·gᵢⱼ + 2κᵢ(1 − κᵢ)·aⱼ·Re c⁻ + κᵢ²·aⱼ²             (4)
 ///   Noise       nᵢ ← (1 − κᵢ)²·nᵢ + 2κᵢ²; a step is worth Δt/τ independent observations                        (5)
-///   Scale       the given speeds times μ:  μ ← μ + 2Δt/T·Σᵢ sᵢ·(rᵢ − Σⱼ (Uⱼ/U₀)²·κᵢ·aⱼ·Im c⁻)/(ωᵢΔt)/Σᵢ(zᵢ + hᵢ),
-///               rᵢ = Im(yᵢ⁻*·yᵢ), by how much the bands turn more than the model says; T = 5 s, |μ − 1| ≤ 0.1     (6)
+///   Scale       the given speeds times μ:  μ ← μ + 2Δt/T_μ·Σᵢ sᵢ·(rᵢ − Σⱼ (Uⱼ/U₀)²·κᵢ·aⱼ·Im c⁻)/(ωᵢΔt)/Σᵢ(zᵢ + hᵢ),
+///               rᵢ = Im(yᵢ⁻*·yᵢ),  hᵢ = Σⱼ (Uⱼ/U₀)²·gᵢⱼ:  by how much the bands turn more than the model says;
+///               T_μ = 5 s, |μ − 1| ≤ 0.1                                                                        (6)
 ///   Source      ours; docs/equations/unbalance_power.md
 ///   Symbols     ε, τ, sᵢ → RotorBandsParams;  yᵢ → band_;  e^{jφᵢ} → phase_;  cᵢⱼ, gᵢⱼ → view_;  rᵢ, κᵢaⱼ·Im c⁻ →
 ///               turning_;  μ → speed_scale_
-///   Valid for   any rate of sampling: all of it is of sampled signals, and a frequency beyond half the rate goes where it
-///               is seen. (4) is exact for speeds that vary in any way and are held from sample to sample. μ takes what
+///   Valid for   any rate of sampling: all of it is of sampled signals, and a frequency beyond half the rate goes
+///               where it is seen. (4) is exact for speeds that vary in any way and are held from sample to sample. μ takes what
 ///               all speeds share, as the sag of a battery; it is found from some 3 % away
 ///   Cost        N sincos, N exponentials and about 25·N² flops, no heap
 template <class Scalar, std::size_t N>

@@ -17,8 +17,8 @@
 
 namespace airworthy {
 
-/// Unbalance of every rotor from the power of the horizontal vibration, without knowledge of rotor phases. The bank says
-/// in how many bands: FlatBand, the whole vibration at once, makes it the source's filter; RotorBands tells the rotors
+/// Unbalance of every rotor from the power of the horizontal vibration, without knowledge of rotor phases. The bank
+/// says in how many bands: FlatBand, the whole vibration at once, makes it the source's filter; RotorBands tells the rotors
 /// apart by their frequencies.
 ///   State       x = [ln Uᵢ/U₀ (N rotors), ln σ/σ₀];  dx = q·dW                                            (1)
 ///   Measurement ã = high-pass(a), first order; of it z, g, n for each band, by the bank. Flat: z = ãx² + ãy²   (2)
@@ -26,15 +26,15 @@ namespace airworthy {
 ///   Jacobian    Hᵢ = ∂h/∂xᵢ = 2wᵢ;  H_{N+1} = 2nσ²                                                        (4)
 ///   Noise       flat: R = 4σ⁴ + ΣᵢΣ_{j≠i} wᵢwⱼ + 4σ²·Σ wᵢ + r₀ = h² − Σ wᵢ² + r₀;  RotorBands: R = h²·τ/Δt + r₀   (5)
 ///   Update      P ← P + Q·Δt;  S = H·P·Hᵀ + R;  x ← x + P·Hᵀ·S⁻¹·(z − h);  P ← P − P·Hᵀ·S⁻¹·H·P, all bands at once (6)
-///   Information J ← J·e^{−Δt/T} + Σ_b g·gᵀ/R, of the powers sᵢ = (Uᵢ/U₀)² and (σ/σ₀)²;  g = ∂h/∂s = Hᵢ/(2sᵢ);
-///               least squares of the same weights  s = J⁻¹·b,  b ← b·e^{−Δt/T} + Σ_b g·z/R. RotorBands: R times
+///   Information J ← J·e^{−Δt/T_J} + Σ_b g·gᵀ/R, of the powers uᵢ = (Uᵢ/U₀)² and (σ/σ₀)²;  g = ∂h/∂u = Hᵢ/(2uᵢ);
+///               least squares of the same weights  u = J⁻¹·b,  b ← b·e^{−Δt/T_J} + Σ_b g·z/R. RotorBands: R times
 ///               max(1, z/h)², both summed over the bands and smoothed                                      (7)
 ///   Source      B. Ghalamchi, Z. Jia, M. W. Mueller, Real-Time Vibration-Based Propeller Fault Diagnosis for
 ///               Multicopters: (1) to (6), flat; the rest is ours. Entry in docs/equations/references.md, derivation in
 ///               docs/equations/unbalance_power.md
 ///   Symbols     Uᵢ → unbalance_kg_m(), mass times radius;  fᵢ = κωᵢ², Δᵢ = Uᵢ/(κm) [m/s² per N],
 ///               so that fᵢΔᵢ = Uᵢωᵢ²/m and κ cancels;  σ → noise_m_s2();
-///               P → p_;  J → information_;  b → explained_;  q_Δ, q_d, r₀, σ₀: SignalPowerParams
+///               P → p_;  J → information_;  b → explained_;  T_J → memory_s_;  q_Δ, q_d, r₀, σ₀: SignalPowerParams
 ///   Deviations  |G|² in (3); a large innovation counts as innovation_limit_sigma·√S, or one knock would move the
 ///               log unbalance by whole units; x is held in [−kLowest, kHighest] and a variance at most 1, beyond which
 ///               the linearised exponential means nothing; all three are counted. Nothing is fused for three time
@@ -82,11 +82,11 @@ class SignalPowerEkf {
 
   /// What the flight since some memory_s has told about each rotor; see isolation().
   struct Isolation {
-    Rotors
-        power{};  ///< (Uᵢ/U₀)² by least squares: linear, so with neither prior nor convergence; noise may make it negative
-    Rotors information{};  ///< 1/(J⁻¹)ᵢᵢ: about sᵢ = (Uᵢ/U₀)², all other rotors and the noise unknown
+    /// uᵢ = (Uᵢ/U₀)² by least squares: linear, so with neither prior nor convergence; noise may make it negative.
+    Rotors power{};
+    Rotors information{};  ///< 1/(J⁻¹)ᵢᵢ: about uᵢ, all other rotors and the noise unknown
     Rotors alone{};  ///< Jᵢᵢ: the same if all others were known. information/alone → 0: confounded
-    std::array<Rotors, N> correlation{};  ///< of the errors of sᵢ, sⱼ; near −1: one can stand for the other
+    std::array<Rotors, N> correlation{};  ///< of the errors of uᵢ, uⱼ; near −1: one can stand for the other
   };
 
   explicit SignalPowerEkf(const SignalPowerParams& params) noexcept
@@ -173,7 +173,7 @@ class SignalPowerEkf {
 
   /// What (7) tells of each rotor. Cost: an inversion of order N + 1; for the rate of a report.
   [[nodiscard]] Isolation isolation() const noexcept;
-  /// Standard deviation of an unbalance of this size at an information Iᵢ of (7): s = (U/U₀)², so
+  /// Standard deviation of an unbalance of this size at an information Iᵢ of (7): u = (U/U₀)², so
   /// σ_U = U₀²/(2U·√Iᵢ). Infinite at no information.
   [[nodiscard]] Scalar unbalance_sigma_kg_m(Scalar information, Scalar unbalance_kg_m) const noexcept {
     return reference_kg_m_ * reference_kg_m_ / (Scalar{2} * unbalance_kg_m * std::sqrt(information));
@@ -320,7 +320,7 @@ class SignalPowerEkf {
 
   void inform(const typename Bank::Readings& readings, const Predictions& predictions, const Vector& square,
               Scalar dt_s) noexcept {                                // (7)
-    const Scalar keep = Scalar{1} / (Scalar{1} + dt_s / memory_s_);  // e^{−Δt/T} to (Δt/T)²/2
+    const Scalar keep = Scalar{1} / (Scalar{1} + dt_s / memory_s_);  // e^{−Δt/T_J} to (Δt/T_J)²/2
     for (std::size_t i = 0; i < kStates; ++i) {
       explained_[i] *= keep;
       for (Scalar& element : information_[i]) element *= keep;

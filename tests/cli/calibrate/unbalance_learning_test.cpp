@@ -98,6 +98,13 @@ TEST_F(UnbalanceLearningTest, LearnsBaselineNoiseLagAndWithATrialMassTheResponse
   EXPECT_TRUE(learned->notes.empty()) << learned->notes.front();
 }
 
+TEST(UnbalanceLearning, PowersOfFlightsThatTaughtTooLittleDoNotCount) {
+  const auto mean = mean_powers({{{1.0, 4.0}, kLeastJudged_s}, {{3.0, 0.0}, 60.0}, {{900.0, 900.0}, 5.0}});
+  EXPECT_EQ(mean[0], 2.0);
+  EXPECT_EQ(mean[1], 2.0);
+  EXPECT_EQ(mean_powers({{{900.0}, 5.0}})[0], 0.0) << "not learned";
+}
+
 TEST_F(UnbalanceLearningTest, OneTrialSaysHowLittleItKnowsOfThePhase) {
   const auto learned = learn_unbalance({log("healthy")}, {{log("trial"), 3, kTrial_mg}}, *config_, 2);
   ASSERT_TRUE(learned.has_value()) << learned.error().text;

@@ -120,10 +120,21 @@ TEST_F(UnbalanceConfigTest, ACalibrationComesBackAsItWasWritten) {
   EXPECT_EQ(config->monitor.baseline_m_s2[3], 0.3);
   EXPECT_EQ(config->monitor.speed_error_ratio[2], -0.005);
   EXPECT_EQ(config->monitor.response_sigma_ratio[1], 0.04);
-  // Twice the response: the same mass shakes twice as much, and the same power means a quarter of the mass squared.
+  // Twice the response: the same mass shakes twice as much.
   const double speed2 = 0.69 * 9.81 / (4.0 * 7.64e-6);
   EXPECT_NEAR(config->monitor.smallest_m_s2, 2.0 * 15e-6 * 0.1 * speed2 / 0.69, 1e-9);
-  EXPECT_EQ(config->monitor.baseline_power[0], 0.125);
+  EXPECT_EQ(config->monitor.baseline_power_m2_s4[0], 0.5);
+}
+
+TEST_F(UnbalanceConfigTest, ACalibratedPowerIsWhatWasFeltWhateverTheThresholds) {
+  write("calibration.toml", to_toml(quad_calibration()));
+  for (const char* threshold : {"unit = \"mg\"\nadvisory = 15\ncaution = 60\nusual = 80\n",
+                                "unit = \"m_s2\"\nadvisory = 0.3\ncaution = 1\nusual = 0.5\n"}) {
+    const auto config = load("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n[threshold]\n" +
+                             std::string{threshold});
+    ASSERT_TRUE(config.has_value()) << config.error().text;
+    EXPECT_EQ(config->monitor.baseline_power_m2_s4[0], 0.5);
+  }
 }
 
 TEST_F(UnbalanceConfigTest, ACalibrationThatDoesNotFitIsRefused) {

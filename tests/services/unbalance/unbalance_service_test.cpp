@@ -65,6 +65,11 @@ class UnbalanceServiceTest : public ::testing::Test {
     return 0.0;
   }
 
+  [[nodiscard]] bool has_evidence(std::size_t rotor, const std::string& name) const {
+    const auto& all = status_.components.at(rotor).evidence;
+    return std::any_of(all.begin(), all.end(), [&](const evidence_t& item) { return item.name == name; });
+  }
+
   std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
   rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
   rt::Log log_{"test", rt::LogLevel::kError};
@@ -84,6 +89,8 @@ TEST_F(UnbalanceServiceTest, NamesTheRotorThatLostABitOfItsPropeller) {
   EXPECT_THAT(status_.muted_reason, HasSubstr("not in flight: on_ground"));
   ASSERT_EQ(status_.components.size(), 6U);
   EXPECT_EQ(status_.components[0].judged, 0);
+  EXPECT_FALSE(has_evidence(0, "tip_mass_growth_low"));
+  EXPECT_FALSE(has_evidence(0, "tip_mass_growth_high"));
 
   fly_until(kOnset_s);
   EXPECT_TRUE(events_.empty());

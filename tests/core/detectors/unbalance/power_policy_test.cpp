@@ -42,7 +42,6 @@ TEST(PowerPolicy, NamesWhatHasGrownForLongEnough) {
   EXPECT_NEAR(verdict.unbalance_kg_m[1], 4e-6, 1e-15);
   EXPECT_NEAR(verdict.growth_kg_m[1], 3e-6, 1e-15);
   EXPECT_NEAR(verdict.sigma_kg_m[1], 1e-6 * 0.01 / (2.0 * 1.0), 1e-10);  // U₀²·σ/(2U)
-  EXPECT_NEAR(verdict.evidence[1], 0.5 * std::pow(3.75 / 0.01, 2), 1e-6);
   EXPECT_EQ(count(after(power, kSure, 0.8)), 0);
 }
 
@@ -50,6 +49,15 @@ TEST(PowerPolicy, NamesNobodyOfAHealthyVehicle) {
   EXPECT_EQ(count(after(kHealthy, kSure, 10.0)), 0);
   // Noise may make a power negative.
   EXPECT_EQ(count(after({1.0, 0.25, -0.3, 1.0}, kSure, 10.0)), 0);
+}
+
+TEST(PowerPolicy, APowerWithinItsDoubtOfZeroIsNotSurelyZero) {
+  // σ = 0.01 of the power: an unbalance of up to U₀·√0.01 would not be told from none.
+  EXPECT_NEAR(after({-0.3, 0.0, 0.0, 0.0}, kSure, 1.0).sigma_kg_m[0], 0.1 * kReference_kg_m, 1e-15);
+  EXPECT_NEAR(after(kHealthy, kSure, 1.0).sigma_kg_m[2], 0.1 * kReference_kg_m, 1e-15);
+  // As much above as a hair below one sigma: up to √0.02 from none at all.
+  EXPECT_NEAR(after({0.01, 0.0, 0.0, 0.0}, kSure, 1.0).sigma_kg_m[0], std::sqrt(0.02) * kReference_kg_m,
+              1e-15);
 }
 
 TEST(PowerPolicy, NamesNobodyBeforeItHasLearned) {

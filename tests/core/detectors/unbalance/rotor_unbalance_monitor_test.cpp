@@ -234,6 +234,35 @@ TEST(RotorUnbalanceMonitor, InAStillHoverNobodyIsBlamed) {
   EXPECT_EQ(flight.candidates, 0b0011U);
 }
 
+TEST(RotorUnbalanceMonitor, OfARotorThatWasNeverReadNoIntervalIsGiven) {
+  Flight flight;
+  flight.offset_rad_s.fill(0.0);
+  flight.wander_rad_s.fill(0.0);
+  flight.damage[1] = 2.0;
+  flight.fly(20.0);
+  for (std::size_t i = 0; i < kN; ++i) {
+    ASSERT_EQ(flight.reason(i), Reason::kConfounded);
+    const RotorUnbalance& rotor = flight.monitor.rotors()[i];
+    EXPECT_TRUE(std::isnan(rotor.reading.low_kg_m));
+    EXPECT_TRUE(std::isnan(rotor.reading.high_kg_m));
+    // What is read is what is felt at the moment, with all the doubt of it.
+    const double kg_m = UnbalanceMonitor::kg_m_per_m_s2(params_with_baseline(), i);
+    EXPECT_EQ(rotor.reading.growth_kg_m, kg_m * rotor.growth_m_s2);
+    EXPECT_GT(rotor.reading.sigma_kg_m, kg_m * rotor.sigma_m_s2);
+  }
+}
+
+TEST(RotorUnbalanceMonitor, OfARotorThatIsJudgedNoMoreNoIntervalIsGiven) {
+  Flight flight;
+  EXPECT_TRUE(std::isnan(flight.monitor.rotors()[1].reading.low_kg_m));
+  flight.fly(5.0);
+  EXPECT_FALSE(std::isnan(flight.monitor.rotors()[1].reading.low_kg_m));
+  flight.monitor.on_phase(Phase::kOnGround);
+  flight.fly(1.0);
+  EXPECT_TRUE(std::isnan(flight.monitor.rotors()[1].reading.low_kg_m));
+  EXPECT_TRUE(std::isnan(flight.monitor.rotors()[1].reading.high_kg_m));
+}
+
 TEST(RotorUnbalanceMonitor, InAStillHoverBaselinesThatHappenToPointOneWayAreNoUnbalance) {
   UnbalanceParams params = params_with_baseline();
   params.baseline_m_s2 = {2.0, 2.0, 0.1, 0.4};
@@ -279,6 +308,24 @@ TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
   EXPECT_LT(measured.monitor.rotors()[1].reading.sigma_kg_m, 0.1 * truth);
   EXPECT_LT(measured.monitor.rotors()[1].reading.low_kg_m, truth);
   EXPECT_GT(measured.monitor.rotors()[1].reading.high_kg_m, truth);
+}
+
+TEST(RotorUnbalanceMonitor, AResponseThatMayBeNextToNothingLeavesTheMassOpen) {
+  UnbalanceParams params = params_with_baseline();
+  params.response_sigma_ratio.fill(0.6);
+  Flight flight{params};
+  flight.damage[1] = 2.0;
+  flight.fly(20.0);
+  const UnbalanceReading& reading = flight.monitor.rotors()[1].reading;
+  EXPECT_EQ(reading.high_kg_m, std::numeric_limits<double>::infinity());
+  EXPECT_GT(reading.sigma_kg_m, 0.6 * reading.growth_kg_m);
+  EXPECT_GT(reading.low_kg_m, 0.0);
+  EXPECT_LT(reading.low_kg_m, reading.growth_kg_m / 2.2);
+
+  Flight mended{params};
+  mended.natural[3] = 0.0;
+  mended.fly(20.0);
+  EXPECT_EQ(mended.monitor.rotors()[3].reading.low_kg_m, -std::numeric_limits<double>::infinity());
 }
 
 TEST(RotorUnbalanceMonitor, WhatWasFoundStaysFoundInAStillHover) {

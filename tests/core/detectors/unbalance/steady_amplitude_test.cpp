@@ -36,6 +36,15 @@ TEST(SteadyAmplitude, IsTheMeanAndItsSigmaFalls) {
   EXPECT_LT(rotor.steady.sigma_m_s2(), 0.4 * at_first);
 }
 
+TEST(SteadyAmplitude, HasNoValueBeforeItWasGivenOne) {
+  Rotor rotor;
+  EXPECT_FALSE(rotor.steady.has_value());
+  rotor.fly(1.0, kStep_s);
+  EXPECT_TRUE(rotor.steady.has_value());
+  rotor.steady.restart();
+  EXPECT_FALSE(rotor.steady.has_value());
+}
+
 TEST(SteadyAmplitude, OfNothingButNoiseIsNearlyNothing) {
   Rotor rotor;
   rotor.fly(0.0, 60.0);
