@@ -82,9 +82,8 @@ std::string to_toml(const Calibration& calibration) {
         "gain = {:.4g}          # learned over described effectiveness; 95 %: {:.4g} to {:.4g}\n"
         "gain_sigma = {:.4g}    # standard error\n"
         "explained = {:.3g}     # R² of the changes that the rotors explain\n"
-        "excited = {}         # false: the gain is the vehicle file's; of roll or pitch, nothing is judged "
-        "until\n"
-        "                       # the motion has shown how the rotors are numbered\n",
+        "excited = {}          # false: the gain is the vehicle file's, and this axis does not show the "
+        "numbering\n",
         kAxisNames[i], axis.gain, axis.gain - 1.96 * axis.gain_sigma, axis.gain + 1.96 * axis.gain_sigma,
         axis.gain_sigma, axis.explained, axis.is_excited);
   }
