@@ -54,9 +54,10 @@ inline constexpr double kDescribedSigma = 0.2;
 ///   Edges              a best value at the edge of its grid (but for no latency and no delay) is refused: it may lie
 ///                      beyond                                                                            (7)
 ///   Smallest loss      s with s²·b/2 = h, b the information that one second of hover gives about a rotor         (5)
-/// Inertial samples that are not finite are left out. Refuses, naming it, an axis that was not excited: the rotors explain less than a tenth of its changes, or its gain
-/// stays uncertain by more than 15 % (standard error). With `keeps_unexcited` such an axis keeps the described gain with
-/// kDescribedSigma, and is marked as not excited; one axis at least must have been excited.
+/// Inertial samples that are not finite are left out. Refuses, naming it, an axis that was not excited: the rotors explain
+/// less than a tenth of its changes, or its gain stays uncertain by more than 15 % (standard error). With `keeps_unexcited`
+/// such an axis keeps the described gain with kDescribedSigma, and is marked as not excited; one axis at least must have
+/// been excited.
 [[nodiscard]] rt::Expected<effectiveness::Calibration> learn_effectiveness(
     const std::vector<EffectivenessRecording>& flights, const effectiveness::EffectivenessConfig& config,
     bool keeps_unexcited = false);

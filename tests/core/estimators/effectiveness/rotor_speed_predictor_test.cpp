@@ -213,6 +213,21 @@ TEST(RotorSpeedPredictor, ReportsThatStopLeaveTheCommands) {
   EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
 }
 
+TEST(RotorSpeedPredictor, GapsAreAsUncertainAsTheScaledCommands) {
+  const auto gap_with_scale = [](double scale) {
+    Predictor predictor{params()};
+    for (int i = 0; i < 1000; ++i) {
+      predictor.on_command(at(0.01 * i), std::array{0.5 + 0.01 * (i % 2), 0.5, 0.5});
+      if (i < 500)
+        predictor.on_speed(at(0.01 * i), std::array{scale * (605.0 + 0.1 * (i % 3)), 600.0, 600.0});
+      static_cast<void>(predictor.advance(at(0.01 * i)));
+    }
+    EXPECT_EQ(predictor.source(), SpeedSource::kCommands);
+    return predictor.gap_sigma(0);
+  };
+  EXPECT_NEAR(gap_with_scale(0.8) / gap_with_scale(1.0), 0.8, 0.01);
+}
+
 TEST(RotorSpeedPredictor, OneStampFromTheFarFutureHealsWithTheNextMessage) {
   Predictor predictor{params()};
   const auto fly = [&predictor](double from_s, double until_s) {
