@@ -39,6 +39,11 @@ void print_summary(const effectiveness::Calibration& calibration) {
   constexpr std::array kAxisNames{"roll", "pitch", "vertical"};
   for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
     const auto& axis = calibration.axis[i];
+    if (!axis.is_excited) {
+      fmt::print("  {:<9} gain of the vehicle file: not excited, rotors explain {:.0f} %\n", kAxisNames[i],
+                 100.0 * axis.explained);
+      continue;
+    }
     fmt::print("  {:<9} gain {:.3f}, 95 % within {:.3f} to {:.3f}; rotors explain {:.0f} %\n", kAxisNames[i],
                axis.gain, axis.gain - 1.96 * axis.gain_sigma, axis.gain + 1.96 * axis.gain_sigma,
                100.0 * axis.explained);

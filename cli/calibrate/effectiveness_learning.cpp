@@ -165,7 +165,13 @@ std::vector<Speeds> commanded_speeds(const std::vector<Recording>& flights, cons
   return result;
 }
 
-/// Sums of every block of 5 s.
+bool is_finite(const Recording::Inertial& sample) {
+  const auto finite = [](double value) { return std::isfinite(value); };
+  return std::all_of(sample.accel_m_s2.begin(), sample.accel_m_s2.end(), finite) &&
+         std::all_of(sample.gyro_rad_s.begin(), sample.gyro_rad_s.end(), finite);
+}
+
+/// Sums of every block of 5 s. Samples that are not finite are left out, as by the detector.
 std::vector<Regression> blocks_of(const std::vector<Recording>& flights, const std::vector<Speeds>& speeds,
                                   const EffectivenessParams& params, double interval_s) {
   const std::size_t n = params.vehicle.rotor_count;
@@ -176,6 +182,7 @@ std::vector<Regression> blocks_of(const std::vector<Recording>& flights, const s
     TimePoint before{};
     for (std::size_t k = 0; k < flights[f].in_flight.size(); ++k) {
       const auto& sample = flights[f].in_flight[k];
+      if (!is_finite(sample)) continue;
       const double dt_s = to_seconds(sample.time - before);
       before = sample.time;
       if (block_s >= kBlock_s) {
@@ -238,7 +245,8 @@ double score_of(const std::vector<Recording>& flights, const std::vector<Speeds>
          learn_axis(blocks, params.effectiveness, kPitchRow).explained;
 }
 
-Duration learn_latency(const std::vector<Recording>& flights, const EffectivenessParams& params) {
+rt::Expected<Duration> learn_latency(const std::vector<Recording>& flights,
+                                     const EffectivenessParams& params) {
   Duration best{0};
   double most = -1.0;
   for (int k = 0; k < kLatencies; ++k) {  // (1)
@@ -248,15 +256,22 @@ Duration learn_latency(const std::vector<Recording>& flights, const Effectivenes
     most = score;
     best = latency;
   }
+  if (best == from_seconds((kLatencies - 1) * kLatencyStep_s)) {
+    return rt::fail_with(fmt::format(
+        "rotor speeds (ESC_STATUS) fit the motion best {:.0f} ms late, the most that is looked for: "
+        "the latency may be longer",
+        1e3 * to_seconds(best)));
+  }
   return best;
 }
 
 /// Flights whose streams are stamped on arrival: each is moved by the delay that explains most of it.
-std::vector<Recording> without_inertial_delay(std::vector<Recording> flights,
-                                              const EffectivenessParams& params) {
+rt::Expected<std::vector<Recording>> without_inertial_delay(std::vector<Recording> flights,
+                                                            const EffectivenessParams& params) {
   for (Recording& flight : flights) {
-    const Duration delay = inertial_delay_of(flight, params);
-    for (auto& sample : flight.in_flight) sample.time -= delay;
+    const auto delay = inertial_delay_of(flight, params);
+    if (!delay) return tl::unexpected<rt::Error>{delay.error()};
+    for (auto& sample : flight.in_flight) sample.time -= *delay;
   }
   return flights;
 }
@@ -295,7 +310,19 @@ struct MotorFit {
   double time_constant_s = 0.0;
   double delay_s = 0.0;  ///< from the stamp of a command to that of the speed
   double squared_error = std::numeric_limits<double>::infinity();
+  bool is_at_edge = false;  ///< of the grid: the best may lie beyond
 };
+
+double lag_s(int i) { return kLeastLag_s * std::pow(kLagRatio, i); }
+constexpr bool is_at_edge(int lag, int delay) { return lag == 0 || lag == kLags - 1 || delay == kDelays - 1; }
+std::string edge_error(const MotorFit& motor) {
+  return fmt::format(
+      "the motors fit the commands (ROTOR_COMMAND) best with a lag of {:.0f} ms after {:.0f} ms, at the edge "
+      "of "
+      "what is looked for (lags of {:.0f} to {:.0f} ms, up to {:.0f} ms late): they may lie beyond",
+      1e3 * motor.time_constant_s, 1e3 * motor.delay_s, 1e3 * lag_s(0), 1e3 * lag_s(kLags - 1),
+      1e3 * (kDelays - 1) * kDelayStep_s);
+}
 
 /// Squared difference between reported speeds and commands through lag and delay, the best scale taken.
 double motor_error(const Recording& flight, const EffectivenessParams& params, std::size_t rotor,
@@ -328,15 +355,15 @@ double motor_error(const Recording& flight, const EffectivenessParams& params, s
 MotorFit learn_motor(const std::vector<Recording>& flights, const EffectivenessParams& params) {
   MotorFit best;
   for (int i = 0; i < kLags; ++i) {  // (3)
-    const double lag_s = kLeastLag_s * std::pow(kLagRatio, i);
+    const double lag = lag_s(i);
     for (int j = 0; j < kDelays; ++j) {
       const double delay_s = j * kDelayStep_s;
       double error = 0.0;
       for (const Recording& flight : flights) {
         for (std::size_t rotor = 0; rotor < params.vehicle.rotor_count; ++rotor)
-          error += motor_error(flight, params, rotor, lag_s, delay_s);
+          error += motor_error(flight, params, rotor, lag, delay_s);
       }
-      if (error > 0.0 && error < best.squared_error) best = {lag_s, delay_s, error};
+      if (error > 0.0 && error < best.squared_error) best = {lag, delay_s, error, is_at_edge(i, j)};
     }
   }
   return best;
@@ -347,13 +374,13 @@ MotorFit learn_unheard_motor(const std::vector<Recording>& flights, const Effect
   MotorFit best;
   double most = -1.0;
   for (int i = 0; i < kLags; ++i) {  // (6)
-    const double lag_s = kLeastLag_s * std::pow(kLagRatio, i);
+    const double lag = lag_s(i);
     for (int j = 0; j < kDelays; ++j) {
       const double delay_s = j * kDelayStep_s;
-      const double score = score_of(flights, commanded_speeds(flights, params, lag_s, delay_s), params);
+      const double score = score_of(flights, commanded_speeds(flights, params, lag, delay_s), params);
       if (score <= most) continue;
       most = score;
-      best = {lag_s, delay_s, 0.0};
+      best = {lag, delay_s, 0.0, is_at_edge(i, j)};
     }
   }
   return best;
@@ -424,15 +451,27 @@ double smallest_loss(const EffectivenessParams& params, double threshold) {
 
 }  // namespace
 
-Duration inertial_delay_of(const EffectivenessRecording& flight, const EffectivenessParams& params) {
+rt::Expected<Duration> inertial_delay_of(const EffectivenessRecording& flight,
+                                         const EffectivenessParams& params) {
+  if (flight.speeds.empty()) {
+    return rt::fail_with(fmt::format(
+        "{}: no rotor speeds (ESC_STATUS), but input.inertial_delay_learned needs them to calibrate",
+        flight.log));
+  }
+  const std::vector<Recording> flights{flight};
   Duration best{0};
   double most = -1.0;
-  if (flight.speeds.empty()) return best;
   for (Duration delay{0}; delay <= StreamDelay<double>::kMost; delay += kInertialDelayStep) {
-    const double score = score_of({flight}, reported_speeds({flight}, params, -delay), params);
+    const double score = score_of(flights, reported_speeds(flights, params, -delay), params);
     if (score <= most) continue;
     most = score;
     best = delay;
+  }
+  if (best == StreamDelay<double>::kMost) {
+    return rt::fail_with(fmt::format(
+        "{}: inertial data (IMU) come {:.0f} ms or more after the rotor speeds (ESC_STATUS), longer "
+        "than what input.inertial_delay_learned can tell",
+        flight.log, 1e3 * to_seconds(best)));
   }
   return best;
 }
@@ -440,8 +479,10 @@ Duration inertial_delay_of(const EffectivenessRecording& flight, const Effective
 rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& recorded,
                                               const EffectivenessConfig& config, bool keeps_unexcited) {
   EffectivenessParams params = config.monitor;
-  const std::vector<Recording> flights =
-      params.learns_inertial_delay ? without_inertial_delay(recorded, params) : recorded;
+  const auto in_time = params.learns_inertial_delay ? without_inertial_delay(recorded, params)
+                                                    : rt::Expected<std::vector<Recording>>{recorded};
+  if (!in_time) return tl::unexpected<rt::Error>{in_time.error()};
+  const std::vector<Recording>& flights = *in_time;
   params.learns_inertial_delay = false;
   Calibration calibration;
   calibration.vehicle = config.vehicle;
@@ -476,14 +517,16 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& reco
   std::vector<Speeds> speeds;
   if (is_unheard) {
     const MotorFit motor = learn_unheard_motor(flights, params);
+    if (motor.is_at_edge) return rt::fail_with(edge_error(motor));
     calibration.speeds_are_commanded = true;
     calibration.motor_time_constant_s = motor.time_constant_s;
     calibration.command_latency_s = motor.delay_s;
     speeds = commanded_speeds(flights, params, motor.time_constant_s, motor.delay_s);
   } else {
-    const Duration latency = learn_latency(flights, params);
-    calibration.telemetry_latency_s = to_seconds(latency);
-    speeds = reported_speeds(flights, params, latency);
+    const auto latency = learn_latency(flights, params);
+    if (!latency) return tl::unexpected<rt::Error>{latency.error()};
+    calibration.telemetry_latency_s = to_seconds(*latency);
+    speeds = reported_speeds(flights, params, *latency);
   }
   const auto blocks = best_blocks(flights, speeds, params);
   std::string errors;
@@ -493,6 +536,7 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& reco
     axis = learn_axis(blocks, params.effectiveness, kRows[i]);
     const bool is_excited =
         axis.explained > kLeastExplained && axis.gain_sigma < kMostRelativeError * axis.gain;
+    axis.is_excited = is_excited;
     excited += is_excited ? 1 : 0;
     if (is_excited) continue;
     errors += fmt::format(
@@ -500,17 +544,19 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& reco
         "fly quick {} manoeuvres",
         errors.empty() ? "" : "\n", kAxisNames[i], 100.0 * axis.explained, axis.gain, axis.gain_sigma,
         i == 2 ? "climbing and sinking" : kAxisNames[i]);
-    if (keeps_unexcited) axis = {1.0, kDescribedSigma, axis.explained};
+    if (keeps_unexcited) axis = {1.0, kDescribedSigma, axis.explained, false};
   }
   if (!errors.empty() && (!keeps_unexcited || excited == 0)) return rt::fail_with(errors);
   if (has_commands && !is_unheard) {
     const MotorFit motor = learn_motor(flights, params);
+    if (motor.is_at_edge) return rt::fail_with(edge_error(motor));
     calibration.motor_time_constant_s = motor.time_constant_s;
     calibration.command_latency_s = std::max(0.0, motor.delay_s - calibration.telemetry_latency_s);
   }
   calibration.gyro_noise_rad_s = params.noise.gyro_rad_s;
   calibration.accel_noise_m_s2 = params.noise.accel_m_s2;
   params = effectiveness::with_calibration(params, calibration);
+  params.mapping_is_known = true;  // the noise is learned from the first sample on
   learn_noise(flights, params, calibration);
   params.noise.gyro_rad_s = calibration.gyro_noise_rad_s;
   calibration.smallest_loss_ratio = smallest_loss(params, EffectivenessMonitor{params}.test().threshold());

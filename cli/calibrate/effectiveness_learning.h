@@ -35,9 +35,10 @@ inline constexpr double kLeastFlight_s = 8.0;
 inline constexpr double kDescribedSigma = 0.2;
 
 /// How much later than the rotor speeds the inertial data of a flight are stamped, where a link stamps on arrival: of
-/// 0, 2.5, … 60 ms the delay for which the described rows explain most of roll and pitch.
-[[nodiscard]] Duration inertial_delay_of(const EffectivenessRecording& flight,
-                                         const effectiveness::EffectivenessParams& params);
+/// 0, 2.5, … 60 ms the delay for which the described rows explain most of roll and pitch. Refuses a flight without rotor
+/// speeds, and 60 ms: it may be more.
+[[nodiscard]] rt::Expected<Duration> inertial_delay_of(const EffectivenessRecording& flight,
+                                                       const effectiveness::EffectivenessParams& params);
 
 /// Learns how a vehicle answers to its rotors.
 ///   Telemetry latency  of 0, 2, … 40 ms the one for which the described rows explain most of roll and pitch     (1)
@@ -50,10 +51,13 @@ inline constexpr double kDescribedSigma = 0.2;
 ///                      of roll and pitch; the speed that a command gives is that of the vehicle file, and what is
 ///                      wrong with it goes into the gains; less than 40 commands a second are refused          (6)
 ///   Noise              what the detector's own variances settle at with (1) to (3)                          (4)
+///   Edges              a best value at the edge of its grid (but for no latency and no delay) is refused: it may lie
+///                      beyond                                                                            (7)
 ///   Smallest loss      s with s²·b/2 = h, b the information that one second of hover gives about a rotor         (5)
-/// Refuses, naming it, an axis that was not excited: the rotors explain less than a tenth of its changes, or its gain
-/// stays uncertain by more than 15 % (standard error). With `keeps_unexcited` such an axis keeps the described gain, marked with
-/// kDescribedSigma; one axis at least must have been excited.
+/// Inertial samples that are not finite are left out. Refuses, naming it, an axis that was not excited: the rotors explain
+/// less than a tenth of its changes, or its gain stays uncertain by more than 15 % (standard error). With `keeps_unexcited`
+/// such an axis keeps the described gain with kDescribedSigma, and is marked as not excited; one axis at least must have
+/// been excited.
 [[nodiscard]] rt::Expected<effectiveness::Calibration> learn_effectiveness(
     const std::vector<EffectivenessRecording>& flights, const effectiveness::EffectivenessConfig& config,
     bool keeps_unexcited = false);

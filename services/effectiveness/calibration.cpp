@@ -34,6 +34,7 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
     calibration.axis[i].gain = table.required<double>("gain", kGain);
     calibration.axis[i].gain_sigma = table.required<double>("gain_sigma", Range{0.0, 5.0});
     calibration.axis[i].explained = table.optional<double>("explained", 0.0);
+    calibration.axis[i].is_excited = table.optional<bool>("excited", false);
   }
   calibration.hash = file.hash();
   return file.finish(std::move(calibration));
@@ -50,7 +51,8 @@ EffectivenessParams with_calibration(EffectivenessParams params, const Calibrati
   params.speeds.telemetry_latency = from_seconds(calibration.telemetry_latency_s);
   params.noise.gyro_rad_s = calibration.gyro_noise_rad_s;
   params.noise.accel_m_s2 = calibration.accel_noise_m_s2;
-  params.mapping_is_known = true;
+  const bool shows_mapping = calibration.axis[0].is_excited && calibration.axis[1].is_excited;
+  params.mapping_is_known = params.mapping_is_known || shows_mapping;
   return params;
 }
 
@@ -79,9 +81,11 @@ std::string to_toml(const Calibration& calibration) {
         "\n[{}]\n"
         "gain = {:.4g}          # learned over described effectiveness; 95 %: {:.4g} to {:.4g}\n"
         "gain_sigma = {:.4g}    # standard error\n"
-        "explained = {:.3g}     # R² of the changes that the rotors explain\n",
+        "explained = {:.3g}     # R² of the changes that the rotors explain\n"
+        "excited = {}          # false: the gain is the vehicle file's, and this axis does not show the "
+        "numbering\n",
         kAxisNames[i], axis.gain, axis.gain - 1.96 * axis.gain_sigma, axis.gain + 1.96 * axis.gain_sigma,
-        axis.gain_sigma, axis.explained);
+        axis.gain_sigma, axis.explained, axis.is_excited);
   }
   return text;
 }

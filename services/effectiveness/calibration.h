@@ -16,6 +16,7 @@ struct Calibration {
     double gain = 1.0;        ///< learned over described effectiveness
     double gain_sigma = 0.0;  ///< standard error over parts of the flights
     double explained = 0.0;   ///< R² of the changes within an interval
+    bool is_excited = true;   ///< false: the flights did not tell the gain, it is the vehicle file's
   };
 
   std::string vehicle;
@@ -35,6 +36,7 @@ struct Calibration {
 /// Reads a calibration file; every error of it at once.
 [[nodiscard]] rt::Expected<Calibration> load_calibration(const std::string& path);
 
+/// The rotors count as numbered as described where both roll and pitch were excited.
 [[nodiscard]] EffectivenessParams with_calibration(EffectivenessParams params,
                                                    const Calibration& calibration);
 

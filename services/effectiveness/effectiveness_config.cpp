@@ -13,6 +13,8 @@ using rt::ConfigTable;
 using rt::Range;
 
 constexpr double kSecondsPerMs = 1e-3;
+constexpr double kMostRateOfDelay_Hz =
+    1000.0;  // samples wait for the speeds of their delay: the detector holds 64
 
 void read_input(ConfigTable table, EffectivenessConfig& config) {
   config.imu_sensor_id = table.optional<int>("imu_sensor_id", 0, Range{0, 127});
@@ -23,6 +25,12 @@ void read_input(ConfigTable table, EffectivenessConfig& config) {
   config.monitor.speeds.command_latency = milliseconds("command_latency_ms", 4.0, 100.0);
   config.monitor.speeds.telemetry_latency = milliseconds("telemetry_latency_ms", 10.0, 100.0);
   config.monitor.learns_inertial_delay = table.optional<bool>("inertial_delay_learned", false);
+  if (config.monitor.learns_inertial_delay && config.monitor.samples_per_s > kMostRateOfDelay_Hz) {
+    table.fail("imu_rate_Hz",
+               fmt::format("{:g} is more than the {:g} of which inertial_delay_learned can learn a delay",
+                           config.monitor.samples_per_s, kMostRateOfDelay_Hz),
+               {"inertial_delay_learned"});
+  }
   config.monitor.most_wait = milliseconds("most_wait_ms", 20.0, 100.0);
   config.monitor.mapping_is_known = table.optional<bool>("rotor_mapping_checked", false);
 }

@@ -4,13 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/import/table.h"
-#include "cli/import/table_map.h"
 #include "runtime/bus/channels.h"
-#include "runtime/bus/log_bus.h"
 #include "runtime/config/vehicle.h"
 #include "services/actuator/actuator_service.h"
-#include "tests/runtime/temporary_folder.h"
+#include "tests/replay/imported.h"
 #include "tests/support/recorded_data.h"
 
 namespace airworthy::actuator {
@@ -25,36 +22,24 @@ struct Raised {
 /// What the service raises over a recorded flight, with the shipped configuration.
 std::vector<Raised> raised_in(const std::filesystem::path& recording, const std::string& map_name,
                               const Multirotor& vehicle) {
-  const rt::TemporaryFolder folder;
-  const auto map = importer::ImportMap::load(std::string{AIRWORTHY_CONFIG} + "/import/" + map_name + ".toml");
-  EXPECT_TRUE(map.has_value()) << (map ? "" : map.error().text);
-  const auto log = folder.path() / "flight.lcm";
-  const auto imported = importer::import_table(recording, *map, {}, map->vehicle, log,
-                                               [](double) { return rt::Expected<void>{}; });
-  EXPECT_TRUE(imported.has_value()) << (imported ? "" : imported.error().text);
+  testing::Imported flight{recording, map_name};
   auto config = ActuatorConfig::load(std::string{AIRWORTHY_CONFIG} + "/actuator.toml", {});
   EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
-  config->vehicle = map->vehicle;
+  config->vehicle = flight.vehicle();
   config->monitor.vehicle = vehicle;
-  auto bus = rt::LogBus::open(log.string());
-  EXPECT_TRUE(bus.has_value());
-  rt::ManualClock clock;
-  rt::Log quiet{"test", rt::LogLevel::kError};
-  rt::Node observer{**bus, clock, quiet, rt::Identity{map->vehicle, "test", 1}};
   std::optional<TimePoint> start;
   std::vector<Raised> raised;
-  observer.subscribe<imu_t>(channel::kImu, [&](const imu_t& message) {
+  flight.node().subscribe<imu_t>(channel::kImu, [&](const imu_t& message) {
     if (!start) start = from_us(message.header.time_us);
   });
-  observer.subscribe<fault_event_t>(channel::kFaultEvent, [&](const fault_event_t& event) {
+  flight.node().subscribe<fault_event_t>(channel::kFaultEvent, [&](const fault_event_t& event) {
     if (event.phase == 1)
       raised.push_back(
           {to_seconds(from_us(event.header.time_us) - *start), event.component, event.magnitude});
   });
-  rt::Node node{**bus, clock, quiet, rt::Identity{map->vehicle, "airworthy-actuator", 1}};
+  rt::Node node = flight.node_of("airworthy-actuator");
   ActuatorService service{node, *config};
-  const auto played = (*bus)->play(clock, [](std::string_view) { return true; });
-  EXPECT_TRUE(played.has_value());
+  flight.play();
   return raised;
 }
 

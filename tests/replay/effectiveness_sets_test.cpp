@@ -9,9 +9,8 @@
 
 #include "cli/calibrate/effectiveness_learning.h"
 #include "cli/eval/flight_run.h"
-#include "cli/import/table.h"
-#include "cli/import/table_map.h"
 #include "services/effectiveness/effectiveness_service.h"
+#include "tests/replay/imported.h"
 #include "tests/replay/scaled_out_flight.h"
 #include "tests/runtime/temporary_folder.h"
 #include "tests/support/recorded_data.h"
@@ -31,15 +30,9 @@ class Set {
     auto config = EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml", overrides);
     EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
     config_ = *config;
-    const auto map =
-        importer::ImportMap::load(std::string{AIRWORTHY_CONFIG} + "/import/" + map_name + ".toml");
-    EXPECT_TRUE(map.has_value()) << (map ? "" : map.error().text);
     for (const std::string& name : names) {
       const auto log = folder_.path() / (name + ".lcm");
-      const auto imported =
-          importer::import_table(testing::recorded_data() / map_name / (name + suffix), *map, {},
-                                 map->vehicle, log, [](double) { return rt::Expected<void>{}; });
-      EXPECT_TRUE(imported.has_value()) << (imported ? "" : imported.error().text);
+      testing::import_recording(testing::recorded_data() / map_name / (name + suffix), map_name, log);
       logs_.push_back(log.string());
     }
   }

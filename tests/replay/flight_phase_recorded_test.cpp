@@ -4,13 +4,10 @@
 #include <map>
 #include <vector>
 
-#include "cli/import/table.h"
-#include "cli/import/table_map.h"
 #include "runtime/bus/channels.h"
-#include "runtime/bus/log_bus.h"
 #include "runtime/config/vehicle.h"
 #include "runtime/phase/flight_phase_input.h"
-#include "tests/runtime/temporary_folder.h"
+#include "tests/replay/imported.h"
 #include "tests/support/recorded_data.h"
 
 namespace airworthy {
@@ -24,30 +21,18 @@ struct Change {
 /// The phases of a recorded flight.
 std::vector<Change> phases_of(const std::filesystem::path& recording, const std::string& map_name,
                               const Multirotor& vehicle) {
-  const rt::TemporaryFolder folder;
-  const auto map = importer::ImportMap::load(std::string{AIRWORTHY_CONFIG} + "/import/" + map_name + ".toml");
-  EXPECT_TRUE(map.has_value()) << (map ? "" : map.error().text);
-  const auto log = folder.path() / "flight.lcm";
-  const auto imported = importer::import_table(recording, *map, {}, map->vehicle, log,
-                                               [](double) { return rt::Expected<void>{}; });
-  EXPECT_TRUE(imported.has_value()) << (imported ? "" : imported.error().text);
-  auto bus = rt::LogBus::open(log.string());
-  EXPECT_TRUE(bus.has_value());
-  rt::ManualClock clock;
-  rt::Log quiet{"test", rt::LogLevel::kError};
-  rt::Node node{**bus, clock, quiet, rt::Identity{map->vehicle, "test", 1}};
-  rt::FlightPhaseInput input{node, vehicle};
+  testing::Imported flight{recording, map_name};
+  rt::FlightPhaseInput input{flight.node(), vehicle};
   std::vector<Change> changes;
   std::optional<TimePoint> start;
-  node.subscribe<imu_t>(channel::kImu, [&](const imu_t& message) {
+  flight.node().subscribe<imu_t>(channel::kImu, [&](const imu_t& message) {
     const TimePoint time = from_us(message.header.time_us);
     if (!start) start = time;
     const Phase phase = input.advance_to(time).phase();
     if (changes.empty() || changes.back().phase != phase)
       changes.push_back({to_seconds(time - *start), phase});
   });
-  const auto played = (*bus)->play(clock, [](std::string_view) { return true; });
-  EXPECT_TRUE(played.has_value());
+  flight.play();
   return changes;
 }
 

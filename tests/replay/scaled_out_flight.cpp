@@ -163,8 +163,11 @@ rt::Expected<ScaledOutFlight> scale_out(const std::string& log, const Effectiven
   if (!recordings) return tl::unexpected<rt::Error>{recordings.error()};
   const Multirotor& vehicle = truth.monitor.vehicle;
   Duration late = truth.monitor.speeds.telemetry_latency;
-  if (truth.monitor.learns_inertial_delay)
-    late -= calibrate::inertial_delay_of(recordings->front(), truth.monitor);
+  if (truth.monitor.learns_inertial_delay) {
+    const auto delay = calibrate::inertial_delay_of(recordings->front(), truth.monitor);
+    if (!delay) return tl::unexpected<rt::Error>{delay.error()};
+    late -= *delay;
+  }
 
   std::vector<SpeedSeries> speeds;
   for (std::size_t i = 0; i < vehicle.rotor_count; ++i) speeds.emplace_back(events, i);

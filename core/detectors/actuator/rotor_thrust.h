@@ -26,7 +26,8 @@ enum class InputSource : std::uint8_t {
 ///   h = J·Σ spinⱼ·ρⱼ·ω̂ⱼ                         angular momentum of the rotors about z                    (4)
 /// Commands tell the torque of this moment; telemetry arrives late, which a feedback loop turns into a loss that is
 /// none, so it only corrects slowly. The limit of ρ keeps a motor that does not follow visible as a loss. With speeds
-/// alone, ω̂ follows them by (1) too, and ρ is 1. Inputs more than 0.5 s old, or as far in the future, are no inputs.
+/// alone, ω̂ follows them by (1) too, and ρ is 1. Inputs more than 0.5 s old, or as far in the future, are no inputs. One
+/// that is more than 0.5 s older than the last shows that the stamp of the last was wrong: it is taken.
 class RotorThrust {
  public:
   using Speeds = std::array<double, kMaxRotors>;
@@ -34,7 +35,7 @@ class RotorThrust {
   RotorThrust(const Multirotor& vehicle, InputSource source) noexcept : vehicle_{vehicle}, source_{source} {}
 
   /// NaN = this rotor did not report: its last speed holds. Beyond twice full speed it is no speed, and refused. So is a
-  /// message for another number of rotors, or older than the last.
+  /// message for another number of rotors, or (up to 0.5 s) older than the last.
   void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept {
     if (speed_rad_s.size() != vehicle_.rotor_count || is_older(time, measured_at_)) return refuse();
     bool any = false;
@@ -54,7 +55,8 @@ class RotorThrust {
     if (any) measured_at_ = time;
   }
 
-  /// A message with a command that is not finite, for another number of rotors or older than the last is refused.
+  /// A message with a command that is not finite, for another number of rotors or (up to 0.5 s) older than the last is
+  /// refused.
   void on_commands(TimePoint time, std::span<const double> command_ratio) noexcept {
     if (command_ratio.size() != vehicle_.rotor_count || is_older(time, commanded_at_)) return refuse();
     for (const double ratio : command_ratio) {
@@ -117,7 +119,7 @@ class RotorThrust {
     return since && now - *since <= kFresh && *since - now <= kFresh;
   }
   static bool is_older(TimePoint time, const std::optional<TimePoint>& last) noexcept {
-    return last && time < *last;
+    return last && time < *last && *last - time <= kFresh;
   }
   void refuse() noexcept { ++refused_messages_; }
 

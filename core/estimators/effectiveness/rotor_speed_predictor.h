@@ -41,11 +41,12 @@ enum class SpeedSource : std::uint8_t {
 ///   Without telemetry (1) alone, with the last s, once no rotor has reported for 0.25 s. A rotor that is silent while
 ///               others report is not taken for one without telemetry: its motor may stand             (5)
 ///   Gaps of (5) commands that come every T are not known between: a random walk of their own diffusion D, estimated from
-///               their changes, leaves σ² = D·(T/6 + time since the newest)                             (6)
+///               their changes, leaves σ² = s²·D·(T/6 + time since the newest)                          (6)
 ///   Symbols     τ → time_constant_s; t_c, t_t → latencies; s → scale: battery sag and command curve
 ///   Plausible   a reported speed is refused beyond 1.6 full speeds, or if it jumps by more than a third of
 ///               full speed from the last one less than 50 ms ago, until three in a row agree               (4)
-/// Times of a kind must not go back; what does is refused and counted. No heap.
+/// Times of a kind must not go back; what does is refused and counted. Where that is by more than 0.5 s, and the newest is
+/// as far ahead of the prediction, the stamp of the newest was wrong: it is forgotten. No heap.
 template <class Scalar, std::size_t kMost = kMaxRotors>
 class RotorSpeedPredictor {
  public:
@@ -56,13 +57,15 @@ class RotorSpeedPredictor {
   }
 
   void on_command(TimePoint time, std::span<const Scalar> command_ratio) noexcept {
-    if (command_ratio.size() != params_.rotor_count || !newer(commands_, time)) return refuse();
+    if (command_ratio.size() != params_.rotor_count) return refuse();
     Sample sample{time, {}};
     for (std::size_t i = 0; i < params_.rotor_count; ++i) {
       if (!std::isfinite(command_ratio[i])) return refuse();
       sample.value[i] = params_.speed_min_rad_s + std::clamp(command_ratio[i], Scalar{0}, Scalar{1}) *
                                                       (params_.speed_max_rad_s - params_.speed_min_rad_s);
     }
+    if (is_wrong_future(commands_, time)) commands_.forget_from(time);
+    if (!newer(commands_, time)) return refuse();
     watch_changes(sample);
     commands_.push(sample);
   }
@@ -72,6 +75,7 @@ class RotorSpeedPredictor {
   void on_speed(TimePoint time, std::span<const Scalar> speed_rad_s) noexcept {
     if (speed_rad_s.size() != params_.rotor_count) return refuse();
     if (speeds_.size > 0 && time == speeds_.newest().time) return join_newest(time, speed_rad_s);
+    if (is_wrong_future(speeds_, time)) forget_reports_from(time);
     if (!newer(speeds_, time)) return refuse();
     for (std::size_t i = 0; i < params_.rotor_count; ++i) hear(i, time, speed_rad_s[i]);
     Sample sample{time, {}};
@@ -107,7 +111,7 @@ class RotorSpeedPredictor {
       for (std::size_t i = 0; i < params_.rotor_count; ++i) speed_[i] = reported(i, time);
     }
     now_ = time;
-    history_.push({time, speed_});
+    remember({time, speed_});
     return true;
   }
 
@@ -115,7 +119,7 @@ class RotorSpeedPredictor {
   [[nodiscard]] std::span<const Scalar> speeds() const noexcept {
     return std::span{speed_}.first(params_.rotor_count);
   }
-  /// What the speed was at a time not long ago.
+  /// What the speed was at a time not long ago: 0.128 s, however often it is asked.
   [[nodiscard]] Scalar speed_at(std::size_t i, TimePoint time) const noexcept { return history_.at(i, time); }
   [[nodiscard]] TimePoint now() const noexcept { return now_; }
   /// s of (2).
@@ -151,7 +155,11 @@ class RotorSpeedPredictor {
   [[nodiscard]] std::int64_t refused_speeds() const noexcept { return refused_speeds_; }
 
  private:
-  static constexpr std::size_t kHistory = 32;
+  static constexpr std::size_t kReceived = 32;
+  static constexpr std::size_t kHistory = 64;
+  static constexpr Duration kHistoryStep{
+      4'000};  // every second sample of the history is at least so much later
+  static constexpr Duration kWrongStamp{500'000};
   static constexpr Duration kCommandsFresh{100'000};
   static constexpr Duration kCommandsLast{250'000};  // without telemetry
   static constexpr Scalar kChangeTime_s = Scalar(1);
@@ -172,22 +180,28 @@ class RotorSpeedPredictor {
     TimePoint time;
     std::array<Scalar, kMost> value{};
   };
+  template <std::size_t kSamples>
   struct Ring {
-    std::array<Sample, kHistory> samples{};
+    std::array<Sample, kSamples> samples{};
     std::size_t size = 0;
     std::size_t next = 0;
 
     void push(const Sample& sample) noexcept {
       samples[next] = sample;
-      next = (next + 1) % kHistory;
-      size = std::min(size + 1, kHistory);
+      next = (next + 1) % kSamples;
+      size = std::min(size + 1, kSamples);
     }
     /// 0 = newest.
     [[nodiscard]] const Sample& back(std::size_t age) const noexcept {
-      return samples[(next + 2 * kHistory - 1 - age) % kHistory];
+      return samples[(next + 2 * kSamples - 1 - age) % kSamples];
     }
     [[nodiscard]] const Sample& newest() const noexcept { return back(0); }
-    [[nodiscard]] Sample& newest() noexcept { return samples[(next + kHistory - 1) % kHistory]; }
+    [[nodiscard]] Sample& newest() noexcept { return samples[(next + kSamples - 1) % kSamples]; }
+
+    /// Takes out what is not before `time`.
+    void forget_from(TimePoint time) noexcept {
+      for (; size > 0 && newest().time >= time; --size) next = (next + kSamples - 1) % kSamples;
+    }
 
     /// Linear between the samples around `time`, held beyond them; NaN values are skipped.
     [[nodiscard]] Scalar at(std::size_t i, TimePoint time) const noexcept {
@@ -275,8 +289,32 @@ class RotorSpeedPredictor {
     if (repeats) refuse();
   }
 
-  static bool newer(const Ring& ring, TimePoint time) noexcept {
+  using Received = Ring<kReceived>;
+  static bool newer(const Received& ring, TimePoint time) noexcept {
     return ring.size == 0 || time > ring.newest().time;
+  }
+  /// Whether a message of `time` shows that the newest was stamped in the future.
+  [[nodiscard]] bool is_wrong_future(const Received& ring, TimePoint time) const noexcept {
+    return ring.size > 0 && ring.newest().time - time > kWrongStamp &&
+           ring.newest().time - now_ > kWrongStamp;
+  }
+  void forget_reports_from(TimePoint time) noexcept {
+    speeds_.forget_from(time);
+    for (std::size_t i = 0; i < params_.rotor_count; ++i) {
+      Report& report = report_[i];
+      report.heard_at = std::min(report.heard_at, time);
+      report.time = std::min(report.time, time);
+      report.same_since = std::min(report.same_since, time);
+      corrected_until_[i] = std::min(corrected_until_[i], time - Duration{1});
+    }
+  }
+  /// The newest always; those before it as far apart as kHistory of them need to reach back far enough.
+  void remember(const Sample& sample) noexcept {
+    if (history_.size > 1 && sample.time - history_.back(1).time < kHistoryStep) {
+      history_.newest() = sample;
+    } else {
+      history_.push(sample);
+    }
   }
   void refuse() noexcept { ++refused_; }
 
@@ -361,9 +399,9 @@ class RotorSpeedPredictor {
   }
 
   RotorSpeedParams<Scalar> params_;
-  Ring commands_;
-  Ring speeds_;
-  Ring history_;
+  Ring<kReceived> commands_;
+  Ring<kReceived> speeds_;
+  Ring<kHistory> history_;
   std::array<Report, kMost> report_{};
   std::array<Scalar, kMost> speed_{};
   std::array<Scalar, kMost> scale_{};

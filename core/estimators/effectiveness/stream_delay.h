@@ -16,7 +16,8 @@ namespace airworthy {
 ///               speeds of d before, from one interval to the next, against Δ²y, that of the gyroscope          (1)
 ///   Explained   R² = c²/(m·s),  m = Σ Δ²u², c = Σ Δ²u·Δ²y, s = Σ Δ²y², c > 0;  mean of roll and pitch          (2)
 ///   Known       R² > 0.3 and n/2·ln((1 − R²_other)/(1 − R²)) > 6 nats over all candidates 20 ms away or more, of
-///               n intervals, 30 at least; then the vertex of the parabola through the best and its neighbours  (3)
+///               n intervals, 30 at least; then the vertex of the parabola through the best and its neighbours: 0 to
+///               57.5 ms. Where the last candidate is the best, the delay may be longer, and is not known         (3)
 ///   Memory      all sums and n fade by 1/150 with every interval: a link's delay may drift                     (4)
 /// Intervals overlap nowhere; no heap; 60 flops for each candidate and sample.
 template <class Scalar>
@@ -57,13 +58,13 @@ class StreamDelay {
     if (intervals_ < kLeastIntervals) return std::nullopt;
     std::size_t best = 0;
     for (std::size_t k = 1; k < kCandidates; ++k) best = explained(k) > explained(best) ? k : best;
-    if (explained(best) < kLeastExplained) return std::nullopt;
+    if (best + 1 == kCandidates || explained(best) < kLeastExplained) return std::nullopt;
     for (std::size_t k = 0; k < kCandidates; ++k) {
       const std::size_t apart = k > best ? k - best : best - k;
       if (apart >= kApart && odds(best, k) < kCertain) return std::nullopt;
     }
     Scalar vertex{0};
-    if (best > 0 && best + 1 < kCandidates) {
+    if (best > 0) {
       const Scalar before = explained(best - 1);
       const Scalar after = explained(best + 1);
       const Scalar bend = Scalar{2} * explained(best) - before - after;

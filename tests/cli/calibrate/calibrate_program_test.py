@@ -11,6 +11,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import tomllib
 import unittest
 
 SKIPPED = 77
@@ -121,6 +122,43 @@ class Calibrate(unittest.TestCase):
         done = self.calibrate(self.folder / "missing" / "out.toml")
         self.assertEqual(done.returncode, 73)
         self.assertIn("out.toml: cannot be written", done.stderr)
+
+
+class Effectiveness(unittest.TestCase):
+    """Learned from the hover of a recorded Bebop 2 until it ejects a propeller: pitch alone is excited."""
+
+    def setUp(self):
+        flight = DATA / "bebop2_prop_eject" / "flight01_11-43-10.csv.xz"
+        if not flight.exists():
+            self.skipTest(f"no recorded flight {flight}")
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        self.log = self.folder / "bebop2.lcm"
+        done = run(IMPORT, "table", flight, "--map", CONFIG / "import" / "bebop2_prop_eject.toml", "-o", self.log)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def calibrate(self, *options):
+        return run(CALIBRATE, "effectiveness", self.log, "--config", CONFIG / "effectiveness.toml",
+                   "--set", f"vehicle={CONFIG}/vehicles/bebop2.toml", "--set", "input.telemetry_latency_ms=0",
+                   "-o", self.folder / "learned.toml", *options)
+
+    def test_axes_that_were_not_excited_are_refused_by_name(self):
+        done = self.calibrate()
+        self.assertEqual(done.returncode, 65)
+        self.assertIn("roll axis not excited", done.stderr)
+        self.assertIn("vertical axis not excited", done.stderr)
+        self.assertNotIn("pitch axis", done.stderr)
+        self.assertFalse((self.folder / "learned.toml").exists())
+
+    def test_keep_unexcited_keeps_them_as_described_and_says_so(self):
+        done = self.calibrate("--keep-unexcited")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, "roll +gain of the vehicle file: not excited")
+        learned = tomllib.loads((self.folder / "learned.toml").read_text(encoding="utf-8"))
+        self.assertEqual([learned[axis]["excited"] for axis in ("roll", "pitch", "vertical")], [False, True, False])
+        self.assertEqual((learned["roll"]["gain"], learned["vertical"]["gain"]), (1.0, 1.0))
+        self.assertNotEqual(learned["pitch"]["gain"], 1.0)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "sim/simulation.h"
 
@@ -114,6 +116,82 @@ TEST(EffectivenessLearning, RefusesAnAxisThatWasNotExcited) {
   EXPECT_EQ(kept->axis[0].gain, 1.0);
   EXPECT_EQ(kept->axis[0].gain_sigma, kDescribedSigma);
   EXPECT_NE(kept->axis[1].gain, 1.0);
+}
+
+TEST(EffectivenessLearning, LeavesOutSamplesThatAreNotFinite) {
+  const auto config = quad_config();
+  const Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, 3);
+  const auto whole = learn_effectiveness({flown.recording}, config);
+  ASSERT_TRUE(whole.has_value()) << whole.error().text;
+  EffectivenessRecording holed = flown.recording;
+  holed.in_flight[4000].gyro_rad_s[1] = std::nan("");
+  holed.in_flight[8000].accel_m_s2[2] = std::numeric_limits<double>::infinity();
+  const auto learned = learn_effectiveness({holed}, config);
+  ASSERT_TRUE(learned.has_value()) << learned.error().text;
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(learned->axis[i].gain, whole->axis[i].gain, 0.01) << i;
+}
+
+TEST(EffectivenessLearning, AWrongNumberingIsNotTakenForKnownWhereAnAxisIsKept) {
+  const auto config = quad_config();
+  Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, 3);
+  const auto right = learn_effectiveness({flown.recording}, config, true);
+  ASSERT_TRUE(right.has_value()) << right.error().text;
+  EXPECT_TRUE(with_calibration(config.monitor, *right).mapping_is_known);
+  for (auto& sample : flown.recording.speeds) std::swap(sample.value[0], sample.value[2]);
+  for (auto& sample : flown.recording.commands) std::swap(sample.value[0], sample.value[2]);
+  const auto refused = learn_effectiveness({flown.recording}, config);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().text, HasSubstr("axis not excited"));
+  const auto kept = learn_effectiveness({flown.recording}, config, true);
+  ASSERT_TRUE(kept.has_value()) << kept.error().text;
+  EXPECT_FALSE(kept->axis[0].is_excited && kept->axis[1].is_excited);
+  EXPECT_FALSE(with_calibration(config.monitor, *kept).mapping_is_known);
+}
+
+TEST(EffectivenessLearning, FindsHowMuchLaterInertialDataComeAndRefusesMoreThanItLooksFor) {
+  auto config = quad_config();
+  config.monitor.learns_inertial_delay = true;
+  const Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, 3);
+  const auto later = [&flown](Duration by) {
+    EffectivenessRecording recording = flown.recording;
+    recording.log = "late.lcm";
+    for (auto& sample : recording.in_flight) sample.time += by;
+    return recording;
+  };
+  // Speeds come some 9 ms late themselves.
+  const auto found = inertial_delay_of(later(Duration{40'000}), config.monitor);
+  ASSERT_TRUE(found.has_value()) << found.error().text;
+  EXPECT_NEAR(to_seconds(*found), 0.031, 0.005);
+  const auto beyond = learn_effectiveness({later(Duration{80'000})}, config);
+  ASSERT_FALSE(beyond.has_value());
+  EXPECT_EQ(beyond.error().text,
+            "late.lcm: inertial data (IMU) come 60 ms or more after the rotor speeds (ESC_STATUS), longer "
+            "than what "
+            "input.inertial_delay_learned can tell");
+  EffectivenessRecording mute = later(Duration{40'000});
+  mute.speeds.clear();
+  const auto without = learn_effectiveness({mute}, config);
+  ASSERT_FALSE(without.has_value());
+  EXPECT_EQ(
+      without.error().text,
+      "late.lcm: no rotor speeds (ESC_STATUS), but input.inertial_delay_learned needs them to calibrate");
+}
+
+TEST(EffectivenessLearning, RefusesABestValueAtTheEdgeOfItsGrid) {
+  const auto config = quad_config();
+  Flown flown = fly(config.monitor.vehicle, sim::Manoeuvre::kRandom, sim::Level::kHard, 3);
+  flown.recording.in_flight.resize(10'000);
+  EffectivenessRecording slow = flown.recording;
+  for (auto& sample : slow.speeds) sample.time += Duration{40'000};
+  const auto late = learn_effectiveness({slow}, config);
+  ASSERT_FALSE(late.has_value());
+  EXPECT_THAT(late.error().text, HasSubstr("rotor speeds (ESC_STATUS) fit the motion best 40 ms late"));
+  EffectivenessRecording early = flown.recording;
+  for (auto& sample : early.commands) sample.time -= Duration{60'000};
+  early.speeds.clear();
+  const auto unheard = learn_effectiveness({early}, config);
+  ASSERT_FALSE(unheard.has_value());
+  EXPECT_THAT(unheard.error().text, HasSubstr("at the edge of what is looked for"));
 }
 
 TEST(EffectivenessLearning, RefusesTooLittleFlightAndMissingSpeeds) {

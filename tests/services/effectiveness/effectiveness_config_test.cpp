@@ -113,6 +113,38 @@ TEST_F(EffectivenessConfigTest, ACalibrationComesBackAsItWasWritten) {
   EXPECT_NE(config->hash, plain->hash);
 }
 
+TEST_F(EffectivenessConfigTest, ACalibrationShowsTheNumberingOnlyWhereRollAndPitchWereExcited) {
+  const auto is_known = [this](const std::string& calibration, const std::string& input = "") {
+    write("calibration.toml", calibration);
+    const auto config =
+        load("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n" + input + kPolicy);
+    EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
+    return config && config->monitor.mapping_is_known;
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Calibration one = learned();
+    one.axis[axis].is_excited = false;
+    EXPECT_EQ(is_known(to_toml(one)), axis == 2) << axis;
+    EXPECT_TRUE(is_known(to_toml(one), "[input]\nrotor_mapping_checked = true\n")) << axis;
+  }
+  std::string unsaid = to_toml(learned());
+  for (std::size_t at = unsaid.find("excited = true"); at != std::string::npos;
+       at = unsaid.find("excited = true"))
+    unsaid.erase(at, std::string{"excited = true"}.size());
+  EXPECT_FALSE(is_known(unsaid));
+}
+
+TEST_F(EffectivenessConfigTest, TheInertialDelayIsLearnedOfAtMost1000SamplesASecond) {
+  const std::string vehicle = "vehicle = \"vehicle.toml\"\n";
+  EXPECT_EQ(
+      error_of(vehicle + "[input]\nimu_rate_Hz = 2000\ninertial_delay_learned = true\n" + kPolicy),
+      "effectiveness.toml:3:1: input.imu_rate_Hz: 2000 is more than the 1000 of which inertial_delay_learned "
+      "can learn a delay");
+  EXPECT_TRUE(
+      load(vehicle + "[input]\nimu_rate_Hz = 1000\ninertial_delay_learned = true\n" + kPolicy).has_value());
+  EXPECT_TRUE(load(vehicle + "[input]\nimu_rate_Hz = 2000\n" + kPolicy).has_value());
+}
+
 TEST_F(EffectivenessConfigTest, ACalibrationOfAnotherVehicleIsRefused) {
   Calibration other = learned();
   other.vehicle = "small";

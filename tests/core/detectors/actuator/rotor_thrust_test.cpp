@@ -98,6 +98,24 @@ TEST(RotorThrust, AnInputFromTheFutureIsNone) {
   EXPECT_FALSE(thrust.is_known());
 }
 
+TEST(RotorThrust, OneStampFromTheFarFutureHealsWithTheNextInput) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  thrust.on_commands(at(1), std::array{0.5, 0.5, 0.5});
+  thrust.on_commands(at(5000), std::array{0.5, 0.5, 0.5});
+  thrust.on_speeds(at(5000), std::array{500.0, 500.0, 500.0});
+  thrust.advance(at(1.01), 0.01);
+  EXPECT_FALSE(thrust.is_known());
+  thrust.on_commands(at(1.02), std::array{0.5, 0.5, 0.5});
+  thrust.advance(at(1.02), 0.01);
+  EXPECT_TRUE(thrust.is_known());
+  thrust.on_speeds(at(1.03), std::array{450.0, 500.0, 500.0});
+  thrust.advance(at(1.03), 0.01);
+  EXPECT_LT(thrust.speed_rad_s(0), 500.0);
+  EXPECT_EQ(thrust.refused_messages(), 0);
+  thrust.on_commands(at(1.01), std::array{0.9, 0.9, 0.9});  // and order counts again
+  EXPECT_EQ(thrust.refused_messages(), 1);
+}
+
 TEST(RotorThrust, SpinningUpTakesTorque) {
   RotorThrust thrust{vehicle(), InputSource::kCommand};
   thrust.on_commands(at(0), std::array{0.0, 0.0, 0.0});

@@ -213,6 +213,72 @@ TEST(RotorSpeedPredictor, ReportsThatStopLeaveTheCommands) {
   EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
 }
 
+TEST(RotorSpeedPredictor, GapsAreAsUncertainAsTheScaledCommands) {
+  const auto gap_with_scale = [](double scale) {
+    Predictor predictor{params()};
+    for (int i = 0; i < 1000; ++i) {
+      predictor.on_command(at(0.01 * i), std::array{0.5 + 0.01 * (i % 2), 0.5, 0.5});
+      if (i < 500)
+        predictor.on_speed(at(0.01 * i), std::array{scale * (605.0 + 0.1 * (i % 3)), 600.0, 600.0});
+      static_cast<void>(predictor.advance(at(0.01 * i)));
+    }
+    EXPECT_EQ(predictor.source(), SpeedSource::kCommands);
+    return predictor.gap_sigma(0);
+  };
+  EXPECT_NEAR(gap_with_scale(0.8) / gap_with_scale(1.0), 0.8, 0.01);
+}
+
+TEST(RotorSpeedPredictor, OneStampFromTheFarFutureHealsWithTheNextMessage) {
+  Predictor predictor{params()};
+  const auto fly = [&predictor](double from_s, double until_s) {
+    for (int i = static_cast<int>(from_s * 100.0); i < static_cast<int>(until_s * 100.0); ++i) {
+      predictor.on_command(at(0.01 * i), std::array{0.5, 0.5, 0.5});
+      predictor.on_speed(at(0.01 * i), std::array{540.0 + std::sin(0.1 * i), 600.0, 630.0});
+      static_cast<void>(predictor.advance(at(0.01 * i)));
+    }
+  };
+  fly(0.0, 1.0);
+  predictor.on_command(at(5000.0), std::array{0.5, 0.5, 0.5});
+  predictor.on_speed(at(5000.0), std::array{540.0, 600.0, 630.0});
+  ASSERT_TRUE(predictor.advance(at(1.0)));
+  fly(1.01, 5.0);
+  EXPECT_EQ(predictor.refused_messages(), 0);
+  EXPECT_EQ(predictor.source(), SpeedSource::kTelemetryAndCommands);
+  EXPECT_EQ(predictor.telemetry(0, at(5.0)), Telemetry::kGood);
+  EXPECT_EQ(predictor.known_until(), at(4.99) + Duration{4'000});
+  EXPECT_NEAR(predictor.speed(0), 540.0, 1.5);
+  EXPECT_NEAR(predictor.command_interval_s(), 0.01, 1e-4);
+  EXPECT_TRUE(predictor.is_overdue(0, at(5.02)));
+  // One that was only held up for long is still none.
+  predictor.on_command(at(4.0), std::array{0.9, 0.9, 0.9});
+  predictor.on_speed(at(4.0), std::array{900.0, 900.0, 900.0});
+  EXPECT_EQ(predictor.refused_messages(), 2);
+}
+
+TEST(RotorSpeedPredictor, RemembersATenthOfASecondHoweverOftenItIsAsked) {
+  constexpr double kRate_rad_s = 15.0;
+  for (const double samples_per_s : {100.0, 500.0, 1000.0, 8000.0}) {
+    Predictor predictor{params()};
+    const int samples = static_cast<int>(samples_per_s);
+    int commands = 0;
+    double now_s = 0.0;
+    for (int i = 0; i < samples; ++i) {
+      now_s = i / samples_per_s;
+      for (; 0.01 * commands <= now_s; ++commands) {
+        const double t = 0.01 * commands;
+        predictor.on_command(at(t), std::array{0.5 + 0.2 * std::sin(kRate_rad_s * (t + 0.004)), 0.5, 0.5});
+      }
+      ASSERT_TRUE(predictor.advance(at(now_s)));
+    }
+    const double newest = predictor.speed(0);
+    EXPECT_EQ(predictor.speed_at(0, at(now_s)), newest);
+    for (const double ago_s : {0.03, 0.06, 0.1, 0.12}) {
+      EXPECT_NEAR(predictor.speed_at(0, at(now_s - ago_s)), lagged(now_s - ago_s, kRate_rad_s), 6.0)
+          << ago_s << " s ago, " << samples_per_s << " times a second";
+    }
+  }
+}
+
 TEST(RotorSpeedPredictor, UsesNoHeap) {
   const test::AllocationGuard guard;
   Predictor predictor{params()};

@@ -69,6 +69,19 @@ TEST(StreamDelay, SaysNothingEarlyNorWithoutAnAnswer) {
   EXPECT_FALSE(still.delay());
 }
 
+TEST(StreamDelay, ADelayBeyondTheLastCandidateIsNotTakenForIt) {
+  for (const double late_s : {0.060, 0.065, 0.075}) {
+    Delay delay{0.06};
+    fly(delay, 20.0, late_s);
+    EXPECT_GT(delay.explained(Delay::kCandidates - 1), Delay::kLeastExplained) << late_s;
+    EXPECT_FALSE(delay.delay()) << late_s;
+  }
+  Delay delay{0.06};
+  fly(delay, 20.0, 0.056);
+  ASSERT_TRUE(delay.delay());
+  EXPECT_NEAR(to_seconds(*delay.delay()), 0.056, 0.003);
+}
+
 TEST(StreamDelay, UsesNoHeap) {
   const test::AllocationGuard guard;
   Delay delay{0.06};
