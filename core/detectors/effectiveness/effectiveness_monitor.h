@@ -92,7 +92,7 @@ struct LossEvent {
   double threshold = 0.0;
   double second = 0.0;
   double unexplained = 0.0;
-  bool is_over = false;  ///< an excess that no longer shows
+  bool is_over = false;  ///< an excess that no longer shows; of kOverEffective alone: losses are latched
   TimePoint onset{};     ///< estimated; of what was there at take-off, since when it has been looked at
   TimePoint sample{};    ///< newest inertial sample that took part
   TimePoint decided{};   ///< of the message with which it was decided
@@ -198,7 +198,12 @@ class EffectivenessMonitor {
   [[nodiscard]] bool is_any_silent(TimePoint now) const noexcept;
   [[nodiscard]] bool is_beyond_ground(const Test::Finding& finding) const noexcept;
   std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
+  /// Below it, effectiveness differs from 1 by nothing worth a word.
+  [[nodiscard]] double dead_ratio() const noexcept;
+  /// Nothing where the rotor is within the dead ratio, and nothing was said of it.
+  [[nodiscard]] std::optional<LossKind> kind_of(const LossEvent& event) const noexcept;
   void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
+  void follow(std::size_t rotor, double effectiveness, const Test::Finding& finding) noexcept;
   std::optional<SlowEvidence::Excess> watch_slowly(const Inertial& sample) noexcept;
   [[nodiscard]] LossEvent event_of(const SlowEvidence::Excess& excess, TimePoint now) noexcept;
 
