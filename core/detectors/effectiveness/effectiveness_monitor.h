@@ -82,6 +82,8 @@ enum class LossKind : std::uint8_t {
   kOverEffective,  ///< more thrust than described: a larger or steeper propeller
 };
 
+inline constexpr std::size_t kLossKinds = 3;
+
 struct LossEvent {
   LossKind kind = LossKind::kPartialLoss;
   std::size_t rotor = 0;
