@@ -588,7 +588,8 @@ void EffectivenessMonitor::follow(std::size_t rotor, double effectiveness,
 
 std::optional<SlowEvidence::Excess> EffectivenessMonitor::watch_slowly(const Inertial& sample) noexcept {
   const bool is_flying = (muted_ == Muted::kNot || muted_ == Muted::kMappingUnknown) && in_flight_since_ &&
-                         sample.time - *in_flight_since_ >= params_.settle_partial && !cautious_;
+                         sample.time - *in_flight_since_ >= params_.settle_partial && !cautious_ &&
+                         source_ != SpeedSource::kCommands;
   return slow_.on_imu({sample.time, sample.accel_m_s2, sample.gyro_rad_s, is_flying, muted_ == Muted::kNot});
 }
 

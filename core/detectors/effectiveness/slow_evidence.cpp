@@ -17,6 +17,8 @@ constexpr Duration kDoubtful{
 constexpr double kMostRate_rad_s =
     3.0;  // where the body tumbles, inertia and air that nobody described decide
 constexpr double kMostTelemetryInterval_s = 0.025;  // between two, speeds are taken as straight lines
+constexpr double kMostGap_s =
+    2.0 * kMostTelemetryInterval_s;    // of a rotor: after a longer one all is doubtful
 constexpr double kTellingSigma = 2.0;  // times the smallest excess: known worse, an update would say nothing
 
 double hover_speed2(const EffectivenessMatrix<double>& matrix) {
@@ -79,19 +81,44 @@ SlowEvidence::SlowEvidence(const SlowEvidenceParams& params) noexcept
 }
 
 void SlowEvidence::on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept {
-  if (last_speeds_ && time > *last_speeds_) {
-    constexpr double kShare = 0.05;
-    telemetry_interval_s_ += kShare * (to_seconds(time - *last_speeds_) - telemetry_interval_s_);
-  }
-  last_speeds_ = time;
   const std::int64_t refused = speeds_.refused_speeds();
   speeds_.on_speed(time, speed_rad_s);
   if (speeds_.refused_speeds() != refused) doubtful_until_ = time + kDoubtful;
+  watch_reports(time);
+}
+
+void SlowEvidence::watch_reports(TimePoint time) noexcept {
+  constexpr double kShare = 0.05;
+  for (std::size_t i = 0; i < n_; ++i) {
+    const auto at = speeds_.accepted_at(i);
+    if (!at || at == reported_at_[i]) continue;
+    const double gap_s = reported_at_[i] ? to_seconds(*at - *reported_at_[i]) : 0.0;
+    reported_at_[i] = at;
+    if (gap_s > kMostGap_s) {
+      doubtful_until_ = time + kDoubtful;
+      continue;
+    }
+    double& mean_s = report_interval_s_[i];
+    mean_s += (mean_s > 0.0 ? kShare : 1.0) * (gap_s - mean_s);
+  }
+}
+
+/// Whether all rotors report so often that their speeds between reports are known.
+bool SlowEvidence::is_reported_often(TimePoint time) const noexcept {
+  for (std::size_t i = 0; i < n_; ++i) {
+    const bool is_known = reported_at_[i] && report_interval_s_[i] > 0.0;
+    if (!is_known || report_interval_s_[i] > kMostTelemetryInterval_s) return false;
+    if (to_seconds(time - *reported_at_[i]) > kMostGap_s) return false;
+  }
+  return true;
 }
 
 void SlowEvidence::end_flight() noexcept {
   for (std::size_t i = 0; i < n_; ++i) {
-    believed_[i] = std::min(believed_[i], 1.0);
+    if (believed_[i] > 1.0) {
+      believed_[i] = 1.0;
+      deviation_[i] = {};
+    }
     if (claim_[i] == Claim::kFound) claim_[i] = Claim::kCarried;
   }
   starts_over_ = true;
@@ -99,6 +126,7 @@ void SlowEvidence::end_flight() noexcept {
 
 void SlowEvidence::believe(std::size_t rotor, double effectiveness) noexcept {
   believed_[rotor] = effectiveness;
+  deviation_ = {};
   starts_over_ = true;
 }
 
@@ -132,7 +160,7 @@ std::optional<SlowEvidence::Excess> SlowEvidence::process(const SlowSample& samp
   if (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] > kMostRate_rad_s * kMostRate_rad_s)
     doubtful_until_ = sample.time + kDoubtful;
   const bool is_doubtful = doubtful_until_ && sample.time < *doubtful_until_;
-  is_running_ = sample.is_judged && !is_doubtful && telemetry_interval_s_ <= kMostTelemetryInterval_s;
+  is_running_ = sample.is_judged && !is_doubtful && is_reported_often(sample.time);
   if (!is_running_) return std::nullopt;
   if (!goes_on) {
     begin(sample);
@@ -219,7 +247,9 @@ SlowEvidence::Excess SlowEvidence::excess_of(std::size_t rotor, const SlowSample
 double SlowEvidence::best_other(std::size_t rotor) const noexcept {
   double best = 0.0;
   for (std::size_t i = 0; i < n_; ++i) {
-    if (i != rotor) best = std::max(best, deviation_[i].evidence);
+    if (i == rotor) continue;
+    if (std::isnan(deviation_[i].evidence)) return deviation_[i].evidence;
+    best = std::max(best, deviation_[i].evidence);
   }
   return best;
 }
@@ -236,8 +266,8 @@ std::optional<SlowEvidence::Excess> SlowEvidence::judge(const SlowSample& sample
 
 bool SlowEvidence::is_excess(std::size_t rotor) const noexcept {
   const auto& deviation = deviation_[rotor];
-  if (deviation.evidence < excess_threshold_) return false;
-  if (effectiveness(rotor) < 1.0 + params_.least_excess_ratio || deviation.mean <= 0.0) return false;
+  if (!(deviation.evidence >= excess_threshold_ && deviation.mean > 0.0)) return false;
+  if (!(effectiveness(rotor) >= 1.0 + params_.least_excess_ratio)) return false;
   return deviation.evidence - best_other(rotor) >= kMargin;
 }
 
@@ -289,7 +319,7 @@ void SlowEvidence::judge_spin() noexcept {
   const auto verdict = spin_.judge();
   if (!verdict) return;
   spin_evidence_ = verdict->over_described;
-  if (verdict->over_described < spin_threshold_) return;
+  if (!(verdict->over_described >= spin_threshold_)) return;
   const bool is_named = verdict->over_second >= kMargin;
   if (wrong_spin_ && spin_is_named_ && !is_named) return;
   wrong_spin_ = verdict->best;

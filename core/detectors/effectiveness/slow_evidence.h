@@ -97,6 +97,8 @@ class SlowEvidence {
     kFound,    ///< in this one
   };
 
+  void watch_reports(TimePoint time) noexcept;
+  [[nodiscard]] bool is_reported_often(TimePoint time) const noexcept;
   std::optional<Excess> process(const SlowSample& sample) noexcept;
   void begin(const SlowSample& sample) noexcept;
   void step(const SlowSample& sample, double dt_s) noexcept;
@@ -126,9 +128,9 @@ class SlowEvidence {
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   std::optional<TimePoint> last_;
-  std::optional<TimePoint> last_speeds_;
+  std::array<std::optional<TimePoint>, kMaxRotors> reported_at_{};
+  std::array<double, kMaxRotors> report_interval_s_{};  ///< running mean; 0: not known yet
   std::optional<TimePoint> doubtful_until_;
-  double telemetry_interval_s_ = 1.0;
   TimePoint since_{};
   double age_s_ = 0.0;  ///< since the last look
   bool starts_over_ = true;
