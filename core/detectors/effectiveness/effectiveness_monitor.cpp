@@ -146,7 +146,7 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
   // From here on, times are those of the rotor speeds.
   const TimePoint moved = time - inertial_delay_;
   if (params_.learns_inertial_delay)
-    learn_delay({time, accel_m_s2, gyro_rad_s, phase}, phase == Phase::kInFlight);
+    learn_delay({time, time, accel_m_s2, gyro_rad_s, phase}, phase == Phase::kInFlight);
   if (last_moved_ && moved <= *last_moved_) {  // the delay has just grown
     ++dropped_;
     return std::nullopt;
@@ -157,7 +157,7 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
     --waiting_count_;
     ++dropped_;
   }
-  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {moved, accel_m_s2, gyro_rad_s, phase};
+  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {time, moved, accel_m_s2, gyro_rad_s, phase};
   ++waiting_count_;
   return process(time);
 }
@@ -437,10 +437,12 @@ std::optional<LossEvent> EffectivenessMonitor::step(const Inertial& sample, Time
   } else {
     muted_ = Muted::kNoSpeeds;
   }
+  const TimePoint stamp_before = last_processed_ ? last_stamp_ : sample.stamp;
   last_processed_ = sample.time;
+  last_stamp_ = sample.stamp;
   if (judgement_observer_ != nullptr) {
     judgement_observer_(judgement_context_,
-                        {before, sample.time, event ? Muted::kNot : muted_, sample.phase, muted_rotor_});
+                        {stamp_before, sample.stamp, event ? Muted::kNot : muted_, sample.phase});
   }
   return event;
 }

@@ -130,11 +130,10 @@ class EffectivenessMonitor {
 
   /// What became of an inertial sample.
   struct Judgement {
-    TimePoint from;  ///< of the sample before
-    TimePoint time;
-    Muted muted;  ///< kNot: it took part in the test, or restarted it after a gap
+    TimePoint from;  ///< stamp of the sample before, as it came
+    TimePoint time;  ///< and of this one
+    Muted muted;     ///< kNot: it took part in the test, or restarted it after a gap
     Phase phase;
-    std::size_t muted_rotor;
   };
   /// Shows every sample in order of time: for evaluation.
   using JudgementObserver = void (*)(void* context, const Judgement& judgement);
@@ -175,7 +174,8 @@ class EffectivenessMonitor {
 
  private:
   struct Inertial {
-    TimePoint time;
+    TimePoint stamp;  ///< as it came
+    TimePoint time;   ///< in that of the rotor speeds
     std::array<double, 3> accel_m_s2;
     std::array<double, 3> gyro_rad_s;
     Phase phase;
@@ -233,6 +233,7 @@ class EffectivenessMonitor {
   std::optional<TimePoint> last_imu_;    ///< as stamped
   std::optional<TimePoint> last_moved_;  ///< less the delay
   std::optional<TimePoint> last_processed_;
+  TimePoint last_stamp_{};  ///< of the same sample
   std::optional<TimePoint> in_flight_since_;
   SpeedSource source_ = SpeedSource::kNone;
   bool needs_start_ = false;

@@ -47,10 +47,13 @@ EffectivenessParams params() {
 /// Hover of a body that answers exactly as described, with white noise of the sensors.
 class Hover {
  public:
-  EffectivenessMonitor monitor{params()};
+  explicit Hover(const EffectivenessParams& described = params()) : monitor{described} {}
+
+  EffectivenessMonitor monitor;
   std::array<double, 4> effectiveness{1.0, 1.0, 1.0, 1.0};
   std::array<double, 3> push_m_s2{};
   Phase phase = Phase::kInFlight;
+  Duration inertial_late{0};  ///< how much later than the speeds the inertial data are stamped
   double step_s = kStep_s;
   double wander_ratio = 0.0;  ///< of the speeds, each on its own; then a controller flies
   std::optional<LossEvent> event;
@@ -72,7 +75,7 @@ class Hover {
       }
       event = monitor.on_speeds(now(), speed);
       if (event) return;
-      event = monitor.on_imu(now(),
+      event = monitor.on_imu(now() + inertial_late,
                              {push_m_s2[0] + 0.3 * normal_(random_), push_m_s2[1] + 0.3 * normal_(random_),
                               vertical + push_m_s2[2] + 0.5 * normal_(random_)},
                              {rate_[0] + 0.02 * normal_(random_), rate_[1] + 0.02 * normal_(random_), 0.0},
@@ -331,6 +334,27 @@ TEST(EffectivenessMonitor, ShowsWhatBecameOfEverySample) {
   EXPECT_NEAR(seen.judged_s, hover.monitor.judged_s(), 0.01);
   EXPECT_NEAR(seen.judged_s + seen.muted_s, 3.0, 0.01);
   EXPECT_NEAR(seen.muted_s, 0.5, 0.01) << "settling";
+}
+
+TEST(EffectivenessMonitor, ShowsWhatBecameOfASampleByItsOwnStamp) {
+  EffectivenessParams described = params();
+  described.learns_inertial_delay = true;
+  Hover hover{described};
+  hover.wander_ratio = 0.05;
+  hover.inertial_late = Duration{30'000};
+  EffectivenessMonitor::Judgement last{};
+  hover.monitor.observe_judgement(
+      [](void* context, const EffectivenessMonitor::Judgement& judgement) {
+        *static_cast<EffectivenessMonitor::Judgement*>(context) = judgement;
+      },
+      &last);
+  hover.fly(20.0);
+  ASSERT_GT(hover.monitor.inertial_delay(), Duration{10'000});
+  EXPECT_EQ(last.muted, Muted::kNot);
+  const Duration waiting = hover.now() + hover.inertial_late - last.time;
+  EXPECT_LT(waiting, hover.monitor.inertial_delay());
+  EXPECT_EQ(waiting % Duration{2'000}, Duration{0}) << "a stamp that was given";
+  EXPECT_EQ(last.time - last.from, Duration{2'000});
 }
 
 TEST(EffectivenessMonitor, ABlowIsNoLoss) {
