@@ -235,8 +235,6 @@ class EffectivenessMonitor {
   std::optional<TimePoint> last_processed_;
   TimePoint last_stamp_{};  ///< of the same sample
   std::optional<TimePoint> in_flight_since_;
-  SpeedSource source_ = SpeedSource::kNone;
-  bool needs_start_ = false;
   std::optional<TimePoint> source_since_;  ///< speeds come from commands alone, or no longer do
   std::optional<std::size_t> lost_;
   std::array<LateralForce, 2> lateral_;
@@ -250,24 +248,27 @@ class EffectivenessMonitor {
   std::size_t delayed_count_ = 0;
   std::optional<TimePoint> delay_added_;
   Duration inertial_delay_{0};
-  bool delay_is_known_ = false;
   SlowEvidence slow_;
-  Mapping mapping_ = Mapping::kUnknown;
   RotorMapping<double>::Verdict numbering_{};
   double mapping_threshold_ = 0.0;
-  bool mapping_was_plausible_ = false;
   double mapping_age_s_ = 0.0;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
   JudgementObserver judgement_observer_ = nullptr;
   void* judgement_context_ = nullptr;
-  bool reported_in_air_ = false;
-  bool cautious_ = false;  ///< perhaps touching the ground
-  Muted muted_ = Muted::kNoSpeeds;
   std::size_t muted_rotor_ = 0;
   double judged_s_ = 0.0;
   std::int64_t times_gone_back_ = 0;
   std::int64_t dropped_ = 0;
+  // Small ones together: no padding between the others.
+  SpeedSource source_ = SpeedSource::kNone;
+  bool needs_start_ = false;
+  bool delay_is_known_ = false;
+  Mapping mapping_ = Mapping::kUnknown;
+  bool mapping_was_plausible_ = false;
+  bool reported_in_air_ = false;
+  bool cautious_ = false;  ///< perhaps touching the ground
+  Muted muted_ = Muted::kNoSpeeds;
 };
 
 }  // namespace airworthy::effectiveness
