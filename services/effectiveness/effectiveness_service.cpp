@@ -16,8 +16,7 @@ using Transition = FaultLifeCycle::Transition;
 constexpr double kRadPerS_per_rpm = std::numbers::pi / 30.0;
 constexpr Duration kInertialTimeout{200'000};
 constexpr double kPullRatio = 0.005;  // of the filter for the status: half a second back to 1 unseen
-constexpr std::size_t kKinds = 3;     // slots of faults for each rotor
-constexpr std::size_t kDescriptionSlot = kKinds * kMaxRotors;
+constexpr std::size_t kDescriptionSlot = kLossKinds * kMaxRotors;  // after a slot for each rotor and kind
 
 std::string_view name_of(SpeedSource source) {
   switch (source) {
@@ -220,28 +219,38 @@ void EffectivenessService::on_rotor_command(const rotor_command_t& message) {
 
 void EffectivenessService::handle(const std::optional<LossEvent>& event) {
   if (!event) return;
-  const bool is_over_effective = event->kind == LossKind::kOverEffective;
+  if (event->kind != LossKind::kOverEffective) {  // what has lost thrust does not give too much any more
+    LossEvent over = *event;
+    over.kind = LossKind::kOverEffective;
+    over.probability = 0.0;
+    over.is_over = true;
+    tell(over);
+  }
+  tell(*event);
+}
+
+void EffectivenessService::tell(const LossEvent& event) {
+  const auto kind = static_cast<std::size_t>(event.kind);
+  bool& is_raised = is_raised_[event.rotor][kind];
+  if (event.is_over && !is_raised) return;
   rt::Fault fault;
-  fault.component = rotor_name(event->rotor);
-  fault.fault_kind = name_of(event->kind);
-  fault.severity = event->kind == LossKind::kPropellerLost ? rt::Severity::kWarning : rt::Severity::kCaution;
-  fault.latched = !is_over_effective;
-  fault.probability = event->probability;
-  fault.magnitude = event->effectiveness;
-  fault.magnitude_sigma = event->sigma;
+  fault.component = rotor_name(event.rotor);
+  fault.fault_kind = name_of(event.kind);
+  fault.severity = event.kind == LossKind::kPropellerLost ? rt::Severity::kWarning : rt::Severity::kCaution;
+  fault.latched = event.kind != LossKind::kOverEffective;
+  fault.probability = event.probability;
+  fault.magnitude = event.effectiveness;
+  fault.magnitude_sigma = event.sigma;
   fault.magnitude_unit = "1";
-  fault.onset = event->onset;
-  fault.summary = summary_of(*event);
-  fault.evidence = evidence_of(*event, monitor_);
+  fault.onset = event.onset;
+  fault.summary = summary_of(event);
+  fault.evidence = evidence_of(event, monitor_);
   // A partial loss that grows is the same fault, until nothing is left.
-  std::optional<LossKind>& raised = raised_[event->rotor];
-  const bool is_new = raised != event->kind;
-  const Transition transition = event->is_over ? Transition::kClear
-                                : is_new       ? Transition::kRaise
-                                               : Transition::kUpdate;
-  reporter_.report(kKinds * event->rotor + static_cast<std::size_t>(event->kind), transition, event->decided,
-                   fault);
-  raised = event->is_over ? std::nullopt : std::optional{event->kind};
+  const Transition transition = event.is_over ? Transition::kClear
+                                : is_raised   ? Transition::kUpdate
+                                              : Transition::kRaise;
+  reporter_.report(kLossKinds * event.rotor + kind, transition, event.decided, fault);
+  is_raised = !event.is_over;
 }
 
 void EffectivenessService::check_description(TimePoint now) {

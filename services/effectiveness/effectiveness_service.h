@@ -46,6 +46,8 @@ class EffectivenessService {
   void on_rotor_command(const rotor_command_t& message);
   void estimate(TimePoint time, const imu_t& message);
   void handle(const std::optional<LossEvent>& event);
+  /// Updates the fault of this kind and rotor where it stands, raises it where not, clears it when it is over.
+  void tell(const LossEvent& event);
   /// Tells once that the vehicle file describes another vehicle, and what of it looks wrong.
   void check_description(TimePoint now);
   [[nodiscard]] rt::DetectorReport report();
@@ -64,7 +66,7 @@ class EffectivenessService {
   TimePoint tick_{};
   JudgementObserver judgement_observer_;
   SpeedSource logged_source_ = SpeedSource::kNone;
-  std::array<std::optional<LossKind>, kMaxRotors> raised_{};
+  std::array<std::array<bool, kLossKinds>, kMaxRotors> is_raised_{};
   Description described_;
   std::string implausible_;  ///< as last published; empty: the description may be right
   rt::FaultReporter reporter_;

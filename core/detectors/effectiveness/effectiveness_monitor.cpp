@@ -146,7 +146,7 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
   // From here on, times are those of the rotor speeds.
   const TimePoint moved = time - inertial_delay_;
   if (params_.learns_inertial_delay)
-    learn_delay({time, accel_m_s2, gyro_rad_s, phase}, phase == Phase::kInFlight);
+    learn_delay({time, time, accel_m_s2, gyro_rad_s, phase}, phase == Phase::kInFlight);
   if (last_moved_ && moved <= *last_moved_) {  // the delay has just grown
     ++dropped_;
     return std::nullopt;
@@ -157,7 +157,7 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
     --waiting_count_;
     ++dropped_;
   }
-  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {moved, accel_m_s2, gyro_rad_s, phase};
+  waiting_[(waiting_first_ + waiting_count_) % kWaiting] = {time, moved, accel_m_s2, gyro_rad_s, phase};
   ++waiting_count_;
   return process(time);
 }
@@ -187,6 +187,11 @@ std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
     if (sample.time > known) break;
     event = step(sample, now);
     const auto excess = watch_slowly(sample);
+    if (excess && (excess->is_first || excess->is_over)) {
+      effectiveness_[excess->rotor] = std::max(0.0, excess->effectiveness);
+      needs_start_ = true;
+    }
+    // Never both: what the fast test has found is believed at once, and the slow evidence starts over.
     if (!event && excess) event = event_of(*excess, now);
     waiting_first_ = (waiting_first_ + 1) % kWaiting;
     --waiting_count_;
@@ -262,6 +267,7 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
   if (sample.phase != Phase::kInFlight && !may_land) {
     in_flight_since_.reset();
     slow_.end_flight();
+    for (double& believed : effectiveness_) believed = std::min(believed, 1.0);  // it may have been changed
   }
   if (sample.phase != Phase::kInFlight && !cautious_) return Muted::kPhase;
   if (mean_step_s_ > 1.0 / kLeastRate_Hz) return Muted::kTooSlow;
@@ -431,10 +437,12 @@ std::optional<LossEvent> EffectivenessMonitor::step(const Inertial& sample, Time
   } else {
     muted_ = Muted::kNoSpeeds;
   }
+  const TimePoint stamp_before = last_processed_ ? last_stamp_ : sample.stamp;
   last_processed_ = sample.time;
+  last_stamp_ = sample.stamp;
   if (judgement_observer_ != nullptr) {
     judgement_observer_(judgement_context_,
-                        {before, sample.time, event ? Muted::kNot : muted_, sample.phase, muted_rotor_});
+                        {stamp_before, sample.stamp, event ? Muted::kNot : muted_, sample.phase});
   }
   return event;
 }
@@ -525,9 +533,14 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   // The first milliseconds show less than is lost: filters of the sensor hold back what has just begun.
   const bool is_partial = event.effectiveness > kSurelyPartial && age >= kEarliestPartial;
   if (!is_lost && !is_partial && age < params_.most_classifying) return std::nullopt;
-  event.kind = event.probability > 0.5 ? LossKind::kPropellerLost : LossKind::kPartialLoss;
-  if (event.effectiveness > 1.0) {
-    event.kind = LossKind::kOverEffective;
+  const auto kind = kind_of(event);
+  if (!kind) {
+    follow(event.rotor, event.effectiveness, *finding);
+    return std::nullopt;
+  }
+  event.kind = *kind;
+  if (event.kind == LossKind::kOverEffective) {
+    event.is_over = event.effectiveness <= 1.0 + dead_ratio();
     event.probability = 1.0 - probability_below(1.0);
   }
   event.evidence = finding->evidence;
@@ -541,13 +554,34 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   return event;
 }
 
+double EffectivenessMonitor::dead_ratio() const noexcept { return params_.least_loss_ratio / 2.0; }
+
+// By what was believed before: an excess that goes is over and no loss of what never was described; a loss that comes back
+// is no excess, for nobody mounts a larger propeller in flight.
+std::optional<LossKind> EffectivenessMonitor::kind_of(const LossEvent& event) const noexcept {
+  const double dead = dead_ratio();
+  const double believed = effectiveness_[event.rotor];
+  const bool was_over = believed > 1.0 + dead;
+  const bool was_partial = believed < 1.0 - dead;
+  if (event.probability > 0.5) return LossKind::kPropellerLost;
+  if (was_partial || event.effectiveness <= 1.0 - dead) return LossKind::kPartialLoss;
+  if (was_over || event.effectiveness > 1.0 + dead) return LossKind::kOverEffective;
+  return std::nullopt;
+}
+
 void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& finding) noexcept {
-  effectiveness_[event.rotor] = std::max(0.0, event.effectiveness);
-  slow_.believe(event.rotor, effectiveness_[event.rotor]);
+  follow(event.rotor, event.effectiveness, finding);
+  slow_.note(event.rotor, event.kind == LossKind::kOverEffective && !event.is_over);
   if (event.kind == LossKind::kPropellerLost) {
     lost_ = event.rotor;
     muted_ = Muted::kRotorLost;
   }
+}
+
+void EffectivenessMonitor::follow(std::size_t rotor, double effectiveness,
+                                  const Test::Finding& finding) noexcept {
+  effectiveness_[rotor] = std::max(0.0, effectiveness);
+  slow_.believe(rotor, effectiveness_[rotor]);
   for (std::size_t axis = 0; axis < 2; ++axis)
     rate_[axis].shift(finding.rate_shift[axis], finding.disturbance_shift[axis]);
   vertical_.shift(finding.disturbance_shift[2]);
@@ -556,7 +590,8 @@ void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& 
 
 std::optional<SlowEvidence::Excess> EffectivenessMonitor::watch_slowly(const Inertial& sample) noexcept {
   const bool is_flying = (muted_ == Muted::kNot || muted_ == Muted::kMappingUnknown) && in_flight_since_ &&
-                         sample.time - *in_flight_since_ >= params_.settle_partial && !cautious_;
+                         sample.time - *in_flight_since_ >= params_.settle_partial && !cautious_ &&
+                         source_ != SpeedSource::kCommands;
   return slow_.on_imu({sample.time, sample.accel_m_s2, sample.gyro_rad_s, is_flying, muted_ == Muted::kNot});
 }
 

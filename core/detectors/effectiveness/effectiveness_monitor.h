@@ -82,6 +82,8 @@ enum class LossKind : std::uint8_t {
   kOverEffective,  ///< more thrust than described: a larger or steeper propeller
 };
 
+inline constexpr std::size_t kLossKinds = 3;
+
 struct LossEvent {
   LossKind kind = LossKind::kPartialLoss;
   std::size_t rotor = 0;
@@ -92,7 +94,7 @@ struct LossEvent {
   double threshold = 0.0;
   double second = 0.0;
   double unexplained = 0.0;
-  bool is_over = false;  ///< an excess that no longer shows
+  bool is_over = false;  ///< an excess that no longer shows; of kOverEffective alone: losses are latched
   TimePoint onset{};     ///< estimated; of what was there at take-off, since when it has been looked at
   TimePoint sample{};    ///< newest inertial sample that took part
   TimePoint decided{};   ///< of the message with which it was decided
@@ -128,11 +130,10 @@ class EffectivenessMonitor {
 
   /// What became of an inertial sample.
   struct Judgement {
-    TimePoint from;  ///< of the sample before
-    TimePoint time;
-    Muted muted;  ///< kNot: it took part in the test, or restarted it after a gap
+    TimePoint from;  ///< stamp of the sample before, as it came
+    TimePoint time;  ///< and of this one
+    Muted muted;     ///< kNot: it took part in the test, or restarted it after a gap
     Phase phase;
-    std::size_t muted_rotor;
   };
   /// Shows every sample in order of time: for evaluation.
   using JudgementObserver = void (*)(void* context, const Judgement& judgement);
@@ -173,7 +174,8 @@ class EffectivenessMonitor {
 
  private:
   struct Inertial {
-    TimePoint time;
+    TimePoint stamp;  ///< as it came
+    TimePoint time;   ///< in that of the rotor speeds
     std::array<double, 3> accel_m_s2;
     std::array<double, 3> gyro_rad_s;
     Phase phase;
@@ -198,7 +200,12 @@ class EffectivenessMonitor {
   [[nodiscard]] bool is_any_silent(TimePoint now) const noexcept;
   [[nodiscard]] bool is_beyond_ground(const Test::Finding& finding) const noexcept;
   std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
+  /// Below it, effectiveness differs from 1 by nothing worth a word.
+  [[nodiscard]] double dead_ratio() const noexcept;
+  /// Nothing where the rotor is within the dead ratio, and nothing was said of it.
+  [[nodiscard]] std::optional<LossKind> kind_of(const LossEvent& event) const noexcept;
   void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
+  void follow(std::size_t rotor, double effectiveness, const Test::Finding& finding) noexcept;
   std::optional<SlowEvidence::Excess> watch_slowly(const Inertial& sample) noexcept;
   [[nodiscard]] LossEvent event_of(const SlowEvidence::Excess& excess, TimePoint now) noexcept;
 
@@ -226,9 +233,8 @@ class EffectivenessMonitor {
   std::optional<TimePoint> last_imu_;    ///< as stamped
   std::optional<TimePoint> last_moved_;  ///< less the delay
   std::optional<TimePoint> last_processed_;
+  TimePoint last_stamp_{};  ///< of the same sample
   std::optional<TimePoint> in_flight_since_;
-  SpeedSource source_ = SpeedSource::kNone;
-  bool needs_start_ = false;
   std::optional<TimePoint> source_since_;  ///< speeds come from commands alone, or no longer do
   std::optional<std::size_t> lost_;
   std::array<LateralForce, 2> lateral_;
@@ -242,24 +248,27 @@ class EffectivenessMonitor {
   std::size_t delayed_count_ = 0;
   std::optional<TimePoint> delay_added_;
   Duration inertial_delay_{0};
-  bool delay_is_known_ = false;
   SlowEvidence slow_;
-  Mapping mapping_ = Mapping::kUnknown;
   RotorMapping<double>::Verdict numbering_{};
   double mapping_threshold_ = 0.0;
-  bool mapping_was_plausible_ = false;
   double mapping_age_s_ = 0.0;
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
   JudgementObserver judgement_observer_ = nullptr;
   void* judgement_context_ = nullptr;
-  bool reported_in_air_ = false;
-  bool cautious_ = false;  ///< perhaps touching the ground
-  Muted muted_ = Muted::kNoSpeeds;
   std::size_t muted_rotor_ = 0;
   double judged_s_ = 0.0;
   std::int64_t times_gone_back_ = 0;
   std::int64_t dropped_ = 0;
+  // Small ones together: no padding between the others.
+  SpeedSource source_ = SpeedSource::kNone;
+  bool needs_start_ = false;
+  bool delay_is_known_ = false;
+  Mapping mapping_ = Mapping::kUnknown;
+  bool mapping_was_plausible_ = false;
+  bool reported_in_air_ = false;
+  bool cautious_ = false;  ///< perhaps touching the ground
+  Muted muted_ = Muted::kNoSpeeds;
 };
 
 }  // namespace airworthy::effectiveness

@@ -55,7 +55,8 @@ template <class Scalar>
 ///   Size          ŝᵢ = aᵢ/bᵢ within the range of the bank, variance 1/bᵢ;  ℓᵢ = ℓᵢ(ŝᵢ)                        (2)
 ///   Reset         t₀ ← now where ℓᵢ(s_least) ≤ 0, as in Page's cumulative sum                               (3)
 ///   Something else  any acceleration of p, q and a_z at once since t₀:  ℓ₀ = Σ_axes a²/(2b)                     (4)
-///   Decision      ℓᵢ ≥ h, ℓᵢ − ℓⱼ ≥ margin for every other rotor j, and ℓ₀ − ℓᵢ within what is allowed           (5)
+///   Decision      ℓᵢ ≥ h, ℓᵢ − ℓⱼ ≥ margin for every other rotor j, and ℓ₀ − ℓᵢ within what is allowed; where i lost,
+///                 ℓⱼ − margin takes the place of ℓⱼ of a gain: no propeller grows in flight                       (5)
 ///   Lasting       ℓ₀ − ℓᵢ ≥ −ℓᵢ/2: a loss is a lasting change, not the rotor's own ups and downs           (6)
 ///   Source        [Page1954], [Willsky1976]; derived in docs/equations/effectiveness.md
 ///   Deviations    t₀ by (3) instead of a search over all t₀: one sum for each rotor and range

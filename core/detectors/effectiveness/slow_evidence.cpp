@@ -17,6 +17,9 @@ constexpr Duration kDoubtful{
 constexpr double kMostRate_rad_s =
     3.0;  // where the body tumbles, inertia and air that nobody described decide
 constexpr double kMostTelemetryInterval_s = 0.025;  // between two, speeds are taken as straight lines
+constexpr double kMostGap_s =
+    2.0 * kMostTelemetryInterval_s;    // of a rotor: after a longer one all is doubtful
+constexpr double kTellingSigma = 2.0;  // times the smallest excess: known worse, an update would say nothing
 
 double hover_speed2(const EffectivenessMatrix<double>& matrix) {
   double lift = 0.0;
@@ -78,19 +81,58 @@ SlowEvidence::SlowEvidence(const SlowEvidenceParams& params) noexcept
 }
 
 void SlowEvidence::on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept {
-  if (last_speeds_ && time > *last_speeds_) {
-    constexpr double kShare = 0.05;
-    telemetry_interval_s_ += kShare * (to_seconds(time - *last_speeds_) - telemetry_interval_s_);
-  }
-  last_speeds_ = time;
   const std::int64_t refused = speeds_.refused_speeds();
   speeds_.on_speed(time, speed_rad_s);
   if (speeds_.refused_speeds() != refused) doubtful_until_ = time + kDoubtful;
+  watch_reports(time);
+}
+
+void SlowEvidence::watch_reports(TimePoint time) noexcept {
+  constexpr double kShare = 0.05;
+  for (std::size_t i = 0; i < n_; ++i) {
+    const auto at = speeds_.accepted_at(i);
+    if (!at || at == reported_at_[i]) continue;
+    const double gap_s = reported_at_[i] ? to_seconds(*at - *reported_at_[i]) : 0.0;
+    reported_at_[i] = at;
+    if (gap_s > kMostGap_s) {
+      doubtful_until_ = time + kDoubtful;
+      continue;
+    }
+    double& mean_s = report_interval_s_[i];
+    mean_s += (mean_s > 0.0 ? kShare : 1.0) * (gap_s - mean_s);
+  }
+}
+
+/// Whether all rotors report so often that their speeds between reports are known.
+bool SlowEvidence::is_reported_often(TimePoint time) const noexcept {
+  for (std::size_t i = 0; i < n_; ++i) {
+    const bool is_known = reported_at_[i] && report_interval_s_[i] > 0.0;
+    if (!is_known || report_interval_s_[i] > kMostTelemetryInterval_s) return false;
+    if (to_seconds(time - *reported_at_[i]) > kMostGap_s) return false;
+  }
+  return true;
+}
+
+void SlowEvidence::end_flight() noexcept {
+  for (std::size_t i = 0; i < n_; ++i) {
+    if (believed_[i] > 1.0) {
+      believed_[i] = 1.0;
+      deviation_[i] = {};
+    }
+    if (claim_[i] == Claim::kFound) claim_[i] = Claim::kCarried;
+  }
+  starts_over_ = true;
 }
 
 void SlowEvidence::believe(std::size_t rotor, double effectiveness) noexcept {
   believed_[rotor] = effectiveness;
+  deviation_ = {};
   starts_over_ = true;
+}
+
+void SlowEvidence::note(std::size_t rotor, bool is_excess) noexcept {
+  claim_[rotor] = is_excess ? Claim::kFound : Claim::kNone;
+  healthy_since_[rotor].reset();
 }
 
 std::optional<SlowEvidence::Excess> SlowEvidence::on_imu(const SlowSample& sample) noexcept {
@@ -118,7 +160,7 @@ std::optional<SlowEvidence::Excess> SlowEvidence::process(const SlowSample& samp
   if (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] > kMostRate_rad_s * kMostRate_rad_s)
     doubtful_until_ = sample.time + kDoubtful;
   const bool is_doubtful = doubtful_until_ && sample.time < *doubtful_until_;
-  is_running_ = sample.is_judged && !is_doubtful && telemetry_interval_s_ <= kMostTelemetryInterval_s;
+  is_running_ = sample.is_judged && !is_doubtful && is_reported_often(sample.time);
   if (!is_running_) return std::nullopt;
   if (!goes_on) {
     begin(sample);
@@ -126,7 +168,6 @@ std::optional<SlowEvidence::Excess> SlowEvidence::process(const SlowSample& samp
   }
   step(sample, dt_s);
   for (std::size_t i = 0; i < n_; ++i) before_[i] = speeds_.speed(i);
-  judged_s_ += dt_s;
   age_s_ += dt_s;
   if (age_s_ < kLook_s) return std::nullopt;
   const double keep = 1.0 - age_s_ / kMemory_s;
@@ -145,7 +186,7 @@ void SlowEvidence::begin(const SlowSample& sample) noexcept {
     deviation_ = {};
     since_ = sample.time;
     age_s_ = 0.0;
-    healthy_since_.reset();
+    healthy_since_ = {};
     starts_over_ = false;
   } else {
     thrust_.resume(rate);
@@ -206,7 +247,9 @@ SlowEvidence::Excess SlowEvidence::excess_of(std::size_t rotor, const SlowSample
 double SlowEvidence::best_other(std::size_t rotor) const noexcept {
   double best = 0.0;
   for (std::size_t i = 0; i < n_; ++i) {
-    if (i != rotor) best = std::max(best, deviation_[i].evidence);
+    if (i == rotor) continue;
+    if (std::isnan(deviation_[i].evidence)) return deviation_[i].evidence;
+    best = std::max(best, deviation_[i].evidence);
   }
   return best;
 }
@@ -216,37 +259,67 @@ std::optional<SlowEvidence::Excess> SlowEvidence::judge(const SlowSample& sample
   const auto deviations = thrust_.deviations();
   if (!deviations) return std::nullopt;
   deviation_ = *deviations;
-  if (active_) return judge_active(sample);
-  if (!sample.may_accuse) return std::nullopt;
+  if (const auto over = clear(sample)) return over;
+  if (const auto excess = accuse(sample)) return excess;
+  return follow(sample);
+}
+
+bool SlowEvidence::is_excess(std::size_t rotor) const noexcept {
+  const auto& deviation = deviation_[rotor];
+  if (!(deviation.evidence >= excess_threshold_ && deviation.mean > 0.0)) return false;
+  if (!(effectiveness(rotor) >= 1.0 + params_.least_excess_ratio)) return false;
+  return deviation.evidence - best_other(rotor) >= kMargin;
+}
+
+std::optional<SlowEvidence::Excess> SlowEvidence::accuse(const SlowSample& sample) noexcept {
+  const bool has_found = std::find(claim_.begin(), claim_.end(), Claim::kFound) != claim_.end();
+  if (has_found || !sample.may_accuse) return std::nullopt;
   for (std::size_t i = 0; i < n_; ++i) {
-    if (deviation_[i].evidence < excess_threshold_) continue;
-    if (effectiveness(i) < 1.0 + params_.least_excess_ratio || deviation_[i].mean <= 0.0) continue;
-    if (deviation_[i].evidence - best_other(i) < kMargin) continue;
-    active_ = i;
-    healthy_since_.reset();
-    return excess_of(i, sample);
+    if (!is_excess(i)) continue;
+    claim_[i] = Claim::kFound;
+    healthy_since_[i].reset();
+    Excess excess = excess_of(i, sample);
+    excess.is_first = true;
+    return excess;
   }
   return std::nullopt;
 }
 
-std::optional<SlowEvidence::Excess> SlowEvidence::judge_active(const SlowSample& sample) noexcept {
-  Excess excess = excess_of(*active_, sample);
-  if (excess.effectiveness + 2.0 * excess.sigma >= 1.0 + params_.least_excess_ratio / 2.0) {
-    healthy_since_.reset();
+std::optional<SlowEvidence::Excess> SlowEvidence::clear(const SlowSample& sample) noexcept {
+  std::optional<Excess> cleared;
+  for (std::size_t i = 0; i < n_; ++i) {
+    if (claim_[i] == Claim::kNone) continue;
+    const Excess excess = excess_of(i, sample);
+    if (!(excess.effectiveness + 2.0 * excess.sigma < 1.0 + params_.least_excess_ratio / 2.0)) {
+      healthy_since_[i].reset();
+      continue;
+    }
+    if (!healthy_since_[i]) healthy_since_[i] = sample.time;
+    if (cleared || sample.time - *healthy_since_[i] < kClearAfter) continue;
+    claim_[i] = Claim::kNone;
+    cleared = excess;
+    cleared->is_over = true;
+  }
+  return cleared;
+}
+
+std::optional<SlowEvidence::Excess> SlowEvidence::follow(const SlowSample& sample) noexcept {
+  for (std::size_t step = 1; step <= n_; ++step) {
+    const std::size_t i = (followed_ + step) % n_;
+    if (claim_[i] == Claim::kNone) continue;
+    const Excess excess = excess_of(i, sample);
+    if (!(excess.sigma <= kTellingSigma * params_.least_excess_ratio)) continue;
+    followed_ = i;
     return excess;
   }
-  if (!healthy_since_) healthy_since_ = sample.time;
-  if (sample.time - *healthy_since_ < kClearAfter) return excess;
-  excess.is_over = true;
-  active_.reset();
-  return excess;
+  return std::nullopt;
 }
 
 void SlowEvidence::judge_spin() noexcept {
   const auto verdict = spin_.judge();
   if (!verdict) return;
   spin_evidence_ = verdict->over_described;
-  if (verdict->over_described < spin_threshold_) return;
+  if (!(verdict->over_described >= spin_threshold_)) return;
   const bool is_named = verdict->over_second >= kMargin;
   if (wrong_spin_ && spin_is_named_ && !is_named) return;
   wrong_spin_ = verdict->best;

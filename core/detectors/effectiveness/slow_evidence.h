@@ -36,8 +36,9 @@ struct SlowSample {
 
 /// What only shows over seconds to minutes: a rotor that has given more thrust than described since take-off, and
 /// rotors that turn the other way than described. It waits for telemetry in place of predicting the speeds.
-///   Excess   ℓᵢ of ThrustRegression at least h, δᵢ at least least_excess, and margin before every other rotor, however
-///            that one differs; cleared when δᵢ + 2σ stays below half of least_excess for kClearAfter
+///   Excess   ℓᵢ of ThrustRegression at least h, kᵢ = believedᵢ·(1 + δᵢ) at least 1 + least_excess with δᵢ > 0, and margin
+///            before every other rotor, however that one differs; cleared when kᵢ + 2σ stays below 1 + ½·least_excess
+///            for kClearAfter. One rotor at a time is accused here; what note() has told of others is followed too
 ///   Spin     a pattern of SpinRegression at least h before the one described; named if margin before all others
 ///   h        ln(hypotheses·looks per hour/false alarms per hour); sums fade within kMemory_s: a look is half of that
 class SlowEvidence {
@@ -53,8 +54,9 @@ class SlowEvidence {
     double probability = 0.0;  ///< that it is above 1
     double evidence = 0.0;
     double second = 0.0;
-    bool is_over = false;  ///< no longer so: cleared
-    TimePoint since{};     ///< first sample of the flight that took part
+    bool is_first = false;  ///< found anew, or again in this flight: not what was said of it before
+    bool is_over = false;   ///< no longer so: cleared
+    TimePoint since{};      ///< first sample of the flight that took part
     TimePoint sample{};
   };
 
@@ -63,10 +65,13 @@ class SlowEvidence {
   void on_speeds(TimePoint time, std::span<const double> speed_rad_s) noexcept;
   /// In order of time. What was found, once a second at most.
   std::optional<Excess> on_imu(const SlowSample& sample) noexcept;
-  /// On the ground: a propeller may be changed. What was said of the sense of rotation stays.
-  void end_flight() noexcept { starts_over_ = true; }
+  /// On the ground: a propeller may be changed. Nobody is believed to give too much any more, and what was said of an excess
+  /// is judged afresh in the next flight. What was said of the sense of rotation stays.
+  void end_flight() noexcept;
   /// The model now takes this for rotor i: evidence against the old model no longer counts.
   void believe(std::size_t rotor, double effectiveness) noexcept;
+  /// Others have said that rotor i gives too much, or that this is over: an excess is followed here until it is over.
+  void note(std::size_t rotor, bool is_excess) noexcept;
 
   /// Bit i: rotor i turns the other way than described; nothing while nobody says so.
   [[nodiscard]] std::optional<std::uint32_t> wrong_spin() const noexcept { return wrong_spin_; }
@@ -75,26 +80,35 @@ class SlowEvidence {
   [[nodiscard]] double spin_evidence() const noexcept { return spin_evidence_; }
   [[nodiscard]] double excess_threshold() const noexcept { return excess_threshold_; }
   [[nodiscard]] double spin_threshold() const noexcept { return spin_threshold_; }
-  /// 1 + δᵢ ± σ as last estimated; 1 ± spread before that.
+  /// kᵢ as last estimated; what is believed where nothing has been seen yet.
   [[nodiscard]] double effectiveness(std::size_t i) const noexcept {
     return believed_[i] * (1.0 + deviation_[i].mean);
   }
-  [[nodiscard]] const ThrustRegression<double>::Deviation& deviation(std::size_t i) const noexcept {
-    return deviation_[i];
-  }
-  [[nodiscard]] std::optional<std::size_t> active() const noexcept { return active_; }
-  [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
+  /// Whether rotor i was said to give too much, and not yet that this is over.
+  [[nodiscard]] bool is_active(std::size_t i) const noexcept { return claim_[i] != Claim::kNone; }
 
  private:
   static constexpr std::size_t kWaiting = 128;
 
+  /// What was said of a rotor's excess.
+  enum class Claim : std::uint8_t {
+    kNone,
+    kCarried,  ///< in an earlier flight
+    kFound,    ///< in this one
+  };
+
+  void watch_reports(TimePoint time) noexcept;
+  [[nodiscard]] bool is_reported_often(TimePoint time) const noexcept;
   std::optional<Excess> process(const SlowSample& sample) noexcept;
   void begin(const SlowSample& sample) noexcept;
   void step(const SlowSample& sample, double dt_s) noexcept;
   std::optional<Excess> judge(const SlowSample& sample) noexcept;
   [[nodiscard]] Excess excess_of(std::size_t rotor, const SlowSample& sample) const noexcept;
   [[nodiscard]] double best_other(std::size_t rotor) const noexcept;
-  std::optional<Excess> judge_active(const SlowSample& sample) noexcept;
+  [[nodiscard]] bool is_excess(std::size_t rotor) const noexcept;
+  std::optional<Excess> accuse(const SlowSample& sample) noexcept;
+  std::optional<Excess> clear(const SlowSample& sample) noexcept;
+  std::optional<Excess> follow(const SlowSample& sample) noexcept;
   void judge_spin() noexcept;
 
   SlowEvidenceParams params_;
@@ -114,16 +128,16 @@ class SlowEvidence {
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   std::optional<TimePoint> last_;
-  std::optional<TimePoint> last_speeds_;
+  std::array<std::optional<TimePoint>, kMaxRotors> reported_at_{};
+  std::array<double, kMaxRotors> report_interval_s_{};  ///< running mean; 0: not known yet
   std::optional<TimePoint> doubtful_until_;
-  double telemetry_interval_s_ = 1.0;
   TimePoint since_{};
   double age_s_ = 0.0;  ///< since the last look
-  double judged_s_ = 0.0;
   bool starts_over_ = true;
   bool is_running_ = false;
-  std::optional<std::size_t> active_;
-  std::optional<TimePoint> healthy_since_;
+  std::array<Claim, kMaxRotors> claim_{};
+  std::array<std::optional<TimePoint>, kMaxRotors> healthy_since_{};
+  std::size_t followed_ = 0;  ///< the rotor of the last update
   std::optional<std::uint32_t> wrong_spin_;
   bool spin_is_named_ = false;
   double spin_evidence_ = 0.0;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "core/time/time.h"
@@ -143,6 +144,10 @@ class RotorSpeedPredictor {
     const Report& report = report_[i];
     return report.heard &&
            to_seconds(now - report.heard_at) > static_cast<double>(kOverdue * report.interval_s);
+  }
+  /// Stamp of the newest report of rotor i that was not refused.
+  [[nodiscard]] std::optional<TimePoint> accepted_at(std::size_t i) const noexcept {
+    return report_[i].accepted ? std::optional{report_[i].time} : std::nullopt;
   }
   [[nodiscard]] Telemetry telemetry(std::size_t i, TimePoint now) const noexcept {
     const Report& report = report_[i];

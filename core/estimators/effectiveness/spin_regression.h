@@ -76,9 +76,6 @@ class SpinRegression {
     gyro_variance_ = {guess, kLeastVarianceRatio * guess, kMostVarianceRatio * guess, kVarianceTime_s};
   }
 
-  /// Whether the vehicle file says enough to tell.
-  [[nodiscard]] bool is_described() const noexcept { return is_described_; }
-
   void start(Scalar rate_rad_s) noexcept {
     rate_.start(rate_rad_s, gyro_variance_.value, authority_ * authority_);
     traces_ = {};
@@ -158,7 +155,7 @@ class SpinRegression {
 
   Params params_;
   std::size_t n_;
-  bool is_described_ = false;
+  bool is_described_ = false;  ///< whether the vehicle file says enough to tell
   Scalar authority_ = 1;
   std::array<Scalar, kMost> drag_per_speed2_{};
   std::array<Scalar, kMost> inertia_ratio_{};

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <vector>
+
 #include "airworthy/tick_t.hpp"
 #include "runtime/bus/channels.h"
 #include "runtime/bus/lcm_bus.h"
@@ -193,6 +196,54 @@ TEST_F(WrongPropeller, IsNamedWithWhatItGives) {
   EXPECT_THAT(event.summary, HasSubstr("is it the right propeller?"));
   for (const fault_event_t& one : events_) EXPECT_EQ(one.component, "rotor 2");
   ASSERT_EQ(status_.active.size(), 1U);
+}
+
+constexpr int kRaised = 1;
+constexpr int kUpdated = 2;
+constexpr int kCleared = 3;
+
+/// What gives too much, then again as described, then too much once more and loses its propeller at last.
+class ExcessThatComesAndGoes : public EffectivenessServiceTest {
+ protected:
+  ExcessThatComesAndGoes() : EffectivenessServiceTest{quad_config(), comes_and_goes()} {}
+
+  static sim::Scenario comes_and_goes() {
+    sim::Scenario scenario = plan();
+    scenario.faults = {
+        {.kind = sim::FaultKind::kOverEffective,
+         .onset_s = 12.0,
+         .end_s = 16.0,
+         .rotor = 2,
+         .magnitude = 0.6},
+        {.kind = sim::FaultKind::kOverEffective,
+         .onset_s = 20.0,
+         .end_s = 24.0,
+         .rotor = 2,
+         .magnitude = 0.6},
+        {.kind = sim::FaultKind::kPropellerLost, .onset_s = 24.0, .rotor = 2, .magnitude = 1.0}};
+    return scenario;
+  }
+};
+
+TEST_F(ExcessThatComesAndGoes, IsRaisedAndClearedByNumber) {
+  fly_until(25.0);
+  // Of every number: raised once, and nothing after it was cleared.
+  std::map<std::int64_t, std::vector<const fault_event_t*>> by_number;
+  for (const fault_event_t& event : events_) {
+    EXPECT_EQ(event.component, "rotor 2") << event.fault_kind;
+    by_number[event.number].push_back(&event);
+  }
+  ASSERT_EQ(by_number.size(), 3U);
+  for (const auto& [number, events] : by_number) {
+    const bool is_lost = number == by_number.rbegin()->first;
+    EXPECT_EQ(events.front()->phase, kRaised) << number;
+    EXPECT_EQ(events.back()->phase == kCleared, !is_lost) << number;
+    for (std::size_t i = 1; i + 1 < events.size(); ++i) EXPECT_EQ(events[i]->phase, kUpdated) << number;
+    for (const auto* event : events)
+      EXPECT_EQ(event->fault_kind, is_lost ? "propeller_lost" : "over_effective") << number;
+  }
+  ASSERT_EQ(status_.active.size(), 1U);
+  EXPECT_EQ(status_.active[0].fault_kind, "propeller_lost");
 }
 
 TEST_F(EffectivenessServiceTest, SilenceOfTheInertialUnitIsNotHealth) {

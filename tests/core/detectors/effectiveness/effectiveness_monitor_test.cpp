@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "tests/support/allocation_guard.h"
 
@@ -46,11 +47,15 @@ EffectivenessParams params() {
 /// Hover of a body that answers exactly as described, with white noise of the sensors.
 class Hover {
  public:
-  EffectivenessMonitor monitor{params()};
+  explicit Hover(const EffectivenessParams& described = params()) : monitor{described} {}
+
+  EffectivenessMonitor monitor;
   std::array<double, 4> effectiveness{1.0, 1.0, 1.0, 1.0};
   std::array<double, 3> push_m_s2{};
   Phase phase = Phase::kInFlight;
+  Duration inertial_late{0};  ///< how much later than the speeds the inertial data are stamped
   double step_s = kStep_s;
+  double wander_ratio = 0.0;  ///< of the speeds, each on its own; then a controller flies
   std::optional<LossEvent> event;
 
   void jump(double seconds) { time_s_ += seconds; }
@@ -62,14 +67,15 @@ class Hover {
       std::array<double, 4> speed{};
       double vertical = 0.0;
       for (std::size_t i = 0; i < 4; ++i) {
-        speed[i] = kHover_rad_s + 0.5 * normal_(random_);
-        const double thrust = effectiveness[i] * kHover_rad_s * kHover_rad_s;
+        const double turning = kHover_rad_s * (1.0 + wander(i));
+        speed[i] = turning + 0.5 * normal_(random_);
+        const double thrust = effectiveness[i] * turning * turning;
         for (std::size_t axis = 0; axis < 2; ++axis) rate_[axis] += step_s * matrix[axis][i] * thrust;
         vertical += matrix[kVerticalRow][i] * thrust;
       }
       event = monitor.on_speeds(now(), speed);
       if (event) return;
-      event = monitor.on_imu(now(),
+      event = monitor.on_imu(now() + inertial_late,
                              {push_m_s2[0] + 0.3 * normal_(random_), push_m_s2[1] + 0.3 * normal_(random_),
                               vertical + push_m_s2[2] + 0.5 * normal_(random_)},
                              {rate_[0] + 0.02 * normal_(random_), rate_[1] + 0.02 * normal_(random_), 0.0},
@@ -80,7 +86,24 @@ class Hover {
   [[nodiscard]] TimePoint now() const { return from_us(1'000'000 + std::llround(time_s_ * 1e6)); }
 
  private:
+  /// Change of a rotor's speed, as a ratio: its own, and a controller's that keeps the body level.
+  double wander(std::size_t i) {
+    if (!(wander_ratio > 0.0)) return 0.0;
+    constexpr double kTime_s = 0.15;
+    wander_[i] +=
+        step_s / kTime_s * -wander_[i] + wander_ratio * std::sqrt(2.0 * step_s / kTime_s) * normal_(random_);
+    double ratio = wander_[i];
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      if (i == 0) angle_[axis] += step_s * rate_[axis];
+      const double sign = params().effectiveness.per_speed2[axis][i] > 0.0 ? 1.0 : -1.0;
+      ratio -= sign * (0.02 * rate_[axis] + 0.1 * angle_[axis]);
+    }
+    return ratio;
+  }
+
   double time_s_ = 0.0;
+  std::array<double, 4> wander_{};
+  std::array<double, 2> angle_{};
   std::array<double, 2> rate_{};
   std::mt19937 random_{17};
   std::normal_distribution<> normal_;
@@ -140,6 +163,103 @@ TEST(EffectivenessMonitor, ReadsASuddenExcess) {
   hover.event.reset();
   hover.fly(3.0);
   EXPECT_FALSE(hover.event) << "the model now expects it";
+}
+
+/// Everything that is said within `seconds`.
+std::vector<LossEvent> said_within(Hover& hover, double seconds) {
+  std::vector<LossEvent> said;
+  const TimePoint end = hover.now() + Duration{std::llround(seconds * 1e6)};
+  while (hover.now() < end) {
+    hover.event.reset();
+    hover.fly(to_seconds(end - hover.now()));
+    if (hover.event) said.push_back(*hover.event);
+  }
+  hover.event.reset();
+  return said;
+}
+
+TEST(EffectivenessMonitor, AnExcessThatGoesIsOverAndNoLoss) {
+  Hover hover;
+  hover.fly(5.0);
+  hover.effectiveness[2] = 1.4;
+  ASSERT_FALSE(said_within(hover, 3.0).empty());
+  EXPECT_TRUE(hover.monitor.slow().is_active(2));
+  hover.effectiveness[2] = 1.0;
+  const auto said = said_within(hover, 3.0);
+  ASSERT_FALSE(said.empty());
+  for (const LossEvent& event : said) {
+    EXPECT_EQ(event.kind, LossKind::kOverEffective) << event.effectiveness;
+    EXPECT_EQ(event.rotor, 2U);
+  }
+  EXPECT_TRUE(said.back().is_over);
+  EXPECT_NEAR(said.back().effectiveness, 1.0, 0.075);
+  EXPECT_FALSE(hover.monitor.slow().is_active(2));
+}
+
+TEST(EffectivenessMonitor, AnExcessThatBecomesALossIsALoss) {
+  Hover hover;
+  hover.fly(5.0);
+  hover.effectiveness[2] = 1.4;
+  ASSERT_FALSE(said_within(hover, 3.0).empty());
+  hover.effectiveness[2] = 0.7;
+  const auto said = said_within(hover, 5.0);
+  ASSERT_FALSE(said.empty());
+  EXPECT_EQ(said.back().kind, LossKind::kPartialLoss);
+  EXPECT_NEAR(said.back().effectiveness, 0.7, 0.05);
+  EXPECT_FALSE(said.back().is_over);
+  EXPECT_FALSE(hover.monitor.slow().is_active(2));
+}
+
+TEST(EffectivenessMonitor, ALossThatComesBackIsNoExcess) {
+  for (const double back : {1.0, 1.1}) {
+    Hover hover;
+    hover.fly(5.0);
+    hover.effectiveness[1] = 0.7;
+    ASSERT_FALSE(said_within(hover, 3.0).empty());
+    hover.effectiveness[1] = back;
+    const auto said = said_within(hover, 3.0);
+    ASSERT_FALSE(said.empty()) << back;
+    for (const LossEvent& event : said) EXPECT_EQ(event.kind, LossKind::kPartialLoss) << event.effectiveness;
+    EXPECT_EQ(said.back().rotor, 1U);
+    EXPECT_NEAR(said.back().effectiveness, back, 0.08);
+  }
+}
+
+// A propeller may be changed on the ground; a loss stays latched.
+TEST(EffectivenessMonitor, OnTheGroundNobodyGivesTooMuchAnyMore) {
+  Hover hover;
+  hover.fly(5.0);
+  hover.effectiveness = {1.0, 0.6, 1.0, 1.0};
+  ASSERT_FALSE(said_within(hover, 3.0).empty());
+  hover.effectiveness = {1.0, 0.6, 1.0, 1.4};
+  ASSERT_FALSE(said_within(hover, 3.0).empty());
+  ASSERT_GT(hover.monitor.effectiveness(3), 1.2);
+  ASSERT_TRUE(hover.monitor.slow().is_active(3));
+  hover.phase = Phase::kOnGround;
+  hover.fly(0.1);
+  EXPECT_EQ(hover.monitor.effectiveness(3), 1.0);
+  EXPECT_EQ(hover.monitor.slow().effectiveness(3), 1.0);
+  EXPECT_NEAR(hover.monitor.effectiveness(1), 0.6, 0.15);
+  EXPECT_TRUE(hover.monitor.slow().is_active(3)) << "to be judged in the next flight";
+}
+
+TEST(EffectivenessMonitor, AnExcessThatWasFoundSlowlyIsKnownToTheFastTest) {
+  Hover hover;
+  hover.wander_ratio = 0.05;
+  hover.effectiveness[0] = 1.5;
+  hover.fly(60.0);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->kind, LossKind::kOverEffective);
+  EXPECT_EQ(hover.event->rotor, 0U);
+  EXPECT_NEAR(hover.event->effectiveness, 1.5, 0.15);
+  EXPECT_EQ(hover.monitor.effectiveness(0), hover.event->effectiveness);
+  hover.event.reset();
+  said_within(hover, 5.0);
+  hover.effectiveness[0] = 1.1;
+  const auto said = said_within(hover, 5.0);
+  ASSERT_FALSE(said.empty());
+  for (const LossEvent& event : said) EXPECT_EQ(event.kind, LossKind::kOverEffective) << event.effectiveness;
+  EXPECT_NEAR(hover.monitor.effectiveness(0), 1.1, 0.15);
 }
 
 TEST(EffectivenessMonitor, IsMutedWithAReason) {
@@ -214,6 +334,27 @@ TEST(EffectivenessMonitor, ShowsWhatBecameOfEverySample) {
   EXPECT_NEAR(seen.judged_s, hover.monitor.judged_s(), 0.01);
   EXPECT_NEAR(seen.judged_s + seen.muted_s, 3.0, 0.01);
   EXPECT_NEAR(seen.muted_s, 0.5, 0.01) << "settling";
+}
+
+TEST(EffectivenessMonitor, ShowsWhatBecameOfASampleByItsOwnStamp) {
+  EffectivenessParams described = params();
+  described.learns_inertial_delay = true;
+  Hover hover{described};
+  hover.wander_ratio = 0.05;
+  hover.inertial_late = Duration{30'000};
+  EffectivenessMonitor::Judgement last{};
+  hover.monitor.observe_judgement(
+      [](void* context, const EffectivenessMonitor::Judgement& judgement) {
+        *static_cast<EffectivenessMonitor::Judgement*>(context) = judgement;
+      },
+      &last);
+  hover.fly(20.0);
+  ASSERT_GT(hover.monitor.inertial_delay(), Duration{10'000});
+  EXPECT_EQ(last.muted, Muted::kNot);
+  const Duration waiting = hover.now() + hover.inertial_late - last.time;
+  EXPECT_LT(waiting, hover.monitor.inertial_delay());
+  EXPECT_EQ(waiting % Duration{2'000}, Duration{0}) << "a stamp that was given";
+  EXPECT_EQ(last.time - last.from, Duration{2'000});
 }
 
 TEST(EffectivenessMonitor, ABlowIsNoLoss) {
