@@ -276,11 +276,15 @@ void FlightPhase::on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2
     ++times_gone_back_;
     return;
   }
-  const double dt_s = has_time_ ? std::min(to_seconds(time - now_), kLongestStep_s) : 0.0;
+  const double since_last_s = has_time_ ? to_seconds(time - now_) : 0.0;
+  const double dt_s = std::min(since_last_s, kLongestStep_s);
   now_ = time;
   if (!has_time_) since_ = time;
   has_time_ = true;
+  const bool had_thrust = has_thrust_ && since_last_s <= kThrustUnknown_s;
   choose_source(time);
+  // Of a take-off not seen throughout (4) does not know the speed gained: that it flies must be shown anew.
+  if (has_thrust_ && !had_thrust && phase_ == Phase::kTakeOff) phase_ = Phase::kUnknown;
   observe(dt_s, accel_m_s2, gyro_rad_s);
   learn(dt_s);
   const Phase phase = next(dt_s);

@@ -46,6 +46,7 @@ enum class LandedReport : std::uint8_t { kUnknown, kOnGround, kInAir, kTakingOff
 ///   Unknown     InFlight   |r_up| < 0.3 g, f > 0.6 g for 2 s, 0.25 s if reported in the air; or as TakeOff
 ///   OnGround    TakeOff    f > 0.35 g, or in the air by (4) or free fall
 ///   TakeOff     InFlight   v > 0.4 m/s and |r_up| < 0.35 g; reported climb > 0.5 m/s; for 0.1 s
+///   TakeOff     Unknown    0.5 s of it without samples, or without knowing the thrust
 ///   Contact     InFlight   free fall for 0.1 s
 ///   Contact     Landing    |r| < 0.35 g for 0.5 s, with thrust
 ///   InFlight    Landing    touch-down: r_up rises by > 0.35 g within 0.3 s; r_up > 0.3 g; reported landing

@@ -70,6 +70,26 @@ TEST_F(FlightPhaseTest, BegunInAHoverWithAReportItIsInFlightAtOnce) {
   EXPECT_EQ(phase_.phase(), Phase::kInFlight);
 }
 
+TEST_F(FlightPhaseTest, ATakeOffKnownByReportAloneEndsInAHoverToo) {
+  tells_speeds_ = false;
+  phase_.on_report(now_, LandedReport::kTakingOff, 0.0);
+  run(0.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kTakeOff);
+  tells_speeds_ = true;
+  run(2.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+}
+
+TEST_F(FlightPhaseTest, ATakeOffThatWasNotSeenThroughoutEndsInAHoverToo) {
+  run(1.0, 0.05, 1.0);
+  run(0.3, 0.7, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kTakeOff);
+  now_ += Duration{1'000'000};
+  phase_.on_rotor_speeds(now_, std::array{495.0, 495.0, 495.0, 495.0});
+  run(2.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+}
+
 TEST_F(FlightPhaseTest, BegunOnTheGroundWithRotorsTurningItIsNotInFlight) {
   run(10.0, 0.5, 1.0);
   EXPECT_EQ(phase_.phase(), Phase::kUnknown);
