@@ -9,6 +9,7 @@ import system_test
 from recording import events, lost_messages, play_inputs, python_bindings, read_log, record
 from system_test import BINARIES, PROJECT, SystemTest, flights
 
+ATTEMPTS = 3
 SPEED = 10.0
 FLIGHTS = ("carbonZ_2018-10-18-11-03-57_engine_failure_with_emr_traj", "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure")
 VEHICLE = "plane1"
@@ -50,6 +51,18 @@ class Replay(SystemTest):
         rig.stop_all()
         return log, feed
 
+    def fly_and_replay(self, name):
+        """Both recordings whole: LCM's logger drops what it cannot take within some 40 ms, and then live and replay saw
+        different flights."""
+        for _ in range(ATTEMPTS):
+            rig, live, _ = self.fly(name)
+            again, feed = self.replay(live)
+            lost = lost_messages(live, VEHICLE), lost_messages(again, VEHICLE)
+            print(f"{name}: lost on the way to the logger: live {lost[0]}, replay {lost[1]}")
+            if not any(lost):
+                return rig, live, again, feed
+        self.skipTest(f"lcm-logger lost messages {ATTEMPTS} times: this computer is too busy")
+
     def alarms_of_eval(self, log):
         """The faults that airworthy eval raises over a recording: component, kind, onset, detection."""
         done = subprocess.run([BINARIES / "airworthy-eval", "--json", "--config", PROJECT / "config/response.toml", log],
@@ -60,12 +73,10 @@ class Replay(SystemTest):
     def test_the_same_events_again(self):
         for name in FLIGHTS:
             with self.subTest(name):
-                rig, live, _ = self.fly(name)
+                rig, live, again, feed = self.fly_and_replay(name)
                 bindings = python_bindings(rig.path)
-                again, feed = self.replay(live)
                 first, second = events(live, bindings, VEHICLE), events(again, bindings, VEHICLE)
-                print(f"{name}: {len(first)} events; lost on the way to the logger: live {lost_messages(live, VEHICLE)}, "
-                      f"replay {lost_messages(again, VEHICLE)}")
+                print(f"{name}: {len(first)} events")
                 self.assertGreater(len(first), 0)
                 self.assertEqual(first, second)
                 raised = [(component, kind, onset_us, detected_us)
