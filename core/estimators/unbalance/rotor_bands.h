@@ -116,10 +116,12 @@ class RotorBands {
     if (!(total > Scalar{0})) return false;
     const Scalar step = Scalar{2} * dt_s / kScaleTime_s * turned / total;
     if (!std::isfinite(step)) return false;
-    speed_scale_ = std::clamp(speed_scale_ + step, Scalar{1} - kMostScaleError, Scalar{1} + kMostScaleError);
-    if (std::abs(speed_scale_ - scale_learned_with_) <= speed_error_) return false;
-    scale_learned_with_ = speed_scale_;
-    return true;
+    const Scalar scale =
+        std::clamp<Scalar>(speed_scale_ + step, Scalar{1} - kMostScaleError, Scalar{1} + kMostScaleError);
+    const bool has_moved = std::abs(scale - scale_learned_with_) > speed_error_;
+    speed_scale_ = scale;
+    if (has_moved) scale_learned_with_ = scale;
+    return has_moved;
   }
 
   /// μ: true speeds over given ones.
