@@ -44,7 +44,7 @@ class PowerFallback {
     policy_.restart();
   }
 
-  /// Nobody asks for now.
+  /// Something else is judged meanwhile: how long a rotor has led before does not count.
   void pause() noexcept { policy_.restart(); }
 
   /// Ignores what is older than the last command, or far ahead of the inertial data.
