@@ -17,7 +17,7 @@ using effectiveness::LossEvent;
 constexpr double kStart_s = 100.0;
 
 // The published filter, for any number of rotors: a tenth of a second back to 1 in what it does not see, the reading of
-// a single fault, and more than one report of the speeds must agree.
+// a single fault against the flight so far, and more than one report of the speeds must agree.
 constexpr double kPullRatio = 0.02;
 constexpr double kUnexplained = 0.2;
 constexpr Duration kPersistence{12'000};
@@ -151,6 +151,7 @@ class Detectors final : public Output {
       return;
     }
     const auto lost = filter_.single_lost(0.9, kUnexplained);
+    filter_.learn_reference(dt_s);
     if (lost != suspect_) suspected_since_ = time;
     suspect_ = lost;
     if (!lost || time - suspected_since_ < kPersistence) return;

@@ -28,6 +28,7 @@ struct LossOfEffectivenessParams {
   Scalar lost_below = Scalar(0.25);
   /// Share of the way back to 1 that k goes each step; 0 = the random walk of the source.
   Scalar pull_ratio = 0;
+  Scalar reference_memory_s = 3;  ///< τ
 };
 
 /// Kalman filter for the effectiveness of every rotor.
@@ -37,11 +38,13 @@ struct LossOfEffectivenessParams {
 ///   Limits      0 ≤ k ≤ 1.5                                                                             (4)
 ///   Decision    P(kᵢ < t) = ½·(1 + erf((t − kᵢ)/(σᵢ·√2)))                                                (5)
 ///   One fault   if only rotor i is off, its most probable effectiveness and what that leaves unexplained:
-///               κᵢ = 1 + eᵢᵀP⁻¹d/(eᵢᵀP⁻¹eᵢ),  var κᵢ = 1/(eᵢᵀP⁻¹eᵢ),  Dᵢ = dᵀP⁻¹d − (eᵢᵀP⁻¹d)²/(eᵢᵀP⁻¹eᵢ),
-///               d = k − 1                                                                             (6)
-///   Source      (1)–(5) [Strack2023], with α = 0 and rows p, q, a_z; (6) ours, docs/equations/effectiveness.md
-///   Symbols     k → k_, P → p_ (N × N), h = B row · ω², R → measurement_variance, Q → process_variance,
-///               α → pull_ratio, t → lost_below
+///               κᵢ = 1 + eᵢᵀP⁻¹d/(k̄ᵢ·eᵢᵀP⁻¹eᵢ),  var κᵢ = 1/(k̄ᵢ²·eᵢᵀP⁻¹eᵢ),
+///               Dᵢ = dᵀP⁻¹d − (eᵢᵀP⁻¹d)²/(eᵢᵀP⁻¹eᵢ),  d = k − k̄                                          (6)
+///   Reference   what a healthy flight makes of k where B is wrong:  k̄ ← k̄ + Δt/min(τ, t)·(k − k̄),
+///               t the time of all such steps; k̄ = 1 before the first                                (7)
+///   Source      (1)–(5) [Strack2023], with α = 0 and rows p, q, a_z; (6), (7) ours, docs/equations/effectiveness.md
+///   Symbols     k → k_, P → p_ (N × N), k̄ → reference_, h = B row · ω², R → measurement_variance,
+///               Q → process_variance, α → pull_ratio, τ → reference_memory_s, t in (5) → lost_below
 ///   Deviations  one rotor or eight, any geometry; the yaw row if its R is finite. Three or four rows cannot
 ///               tell N > rows rotors apart: with α = 0 the variance of what they do not see grows without
 ///               bound. α > 0 bounds it at Q/(1 − (1 − α)²) and leads k back to 1 there, and (6) reads one lost
@@ -54,11 +57,13 @@ class LossOfEffectivenessFilter {
  public:
   using Params = LossOfEffectivenessParams<Scalar>;
   struct SingleFault {
-    Scalar effectiveness = 1;  ///< κᵢ
+    Scalar effectiveness = 1;  ///< κᵢ; of what rotor i gave before, if that was learned
     Scalar variance = 0;
     Scalar unexplained = 0;  ///< Dᵢ; χ² with N − 1 degrees of freedom if only rotor i is off
   };
   static constexpr Scalar kLongestStep_s = Scalar(0.1);
+  /// A rotor that gives less than this is no reference for anything.
+  static constexpr Scalar kLeastReference = Scalar(0.5);
 
   LossOfEffectivenessFilter(const EffectivenessMatrix<Scalar>& effectiveness, const Params& params) noexcept
       : effectiveness_{effectiveness},
@@ -68,6 +73,7 @@ class LossOfEffectivenessFilter {
         n_{effectiveness.rotor_count} {
     speed_.fill(lowpass());
     k_.fill(Scalar{1});
+    reference_.fill(Scalar{1});
     for (std::size_t i = 0; i < n_; ++i) p_[i][i] = params.process_variance;
   }
 
@@ -97,7 +103,19 @@ class LossOfEffectivenessFilter {
     return UpdateStatus::kFused;
   }
 
+  /// (7): the vehicle flies, and so far as one knows its rotors are as they were. Without, faults are measured from 1.
+  void learn_reference(Scalar dt_s) noexcept {
+    if (!(dt_s > Scalar{0})) return;
+    learned_s_ = std::min(learned_s_ + dt_s, params_.reference_memory_s);
+    for (std::size_t i = 0; i < n_; ++i) {
+      const Scalar towards = std::min(dt_s / learned_s_, Scalar{1}) * (k_[i] - reference_[i]);
+      reference_[i] = std::clamp(reference_[i] + towards, kLeastReference, params_.most_effectiveness);
+    }
+  }
+
   [[nodiscard]] std::size_t rotor_count() const noexcept { return n_; }
+  /// k̄ᵢ
+  [[nodiscard]] Scalar reference(std::size_t i) const noexcept { return reference_[i]; }
   [[nodiscard]] Scalar effectiveness(std::size_t i) const noexcept { return k_[i]; }
   [[nodiscard]] Scalar covariance(std::size_t i, std::size_t j) const noexcept { return p_[i][j]; }
   /// (5) from the marginal of rotor i.
@@ -117,7 +135,7 @@ class LossOfEffectivenessFilter {
       if ((*faults)[i].unexplained < (*faults)[best].unexplained) best = i;
     }
     const SingleFault& fault = (*faults)[best];
-    const Scalar loss = Scalar{1} - fault.effectiveness;
+    const Scalar loss = Scalar{1} - fault.effectiveness;  // over its deviation the same for any k̄
     if (fault.unexplained > unexplained * (fault.unexplained + loss * loss / fault.variance))
       return std::nullopt;
     if (probability_below(params_.lost_below, fault.effectiveness, fault.variance) > probability) return best;
@@ -202,6 +220,8 @@ class LossOfEffectivenessFilter {
   SecondOrderLowpass<Scalar> vertical_;
   std::array<SecondOrderLowpass<Scalar>, kMost> speed_{};
   std::array<Scalar, kMost> k_{};
+  std::array<Scalar, kMost> reference_{};
+  Scalar learned_s_ = 0;
   Matrix p_{};
   std::size_t n_;
   bool started_ = false;
@@ -229,7 +249,7 @@ LossOfEffectivenessFilter<Scalar, kMost>::single_faults() const noexcept {
     return b;
   };
   std::array<Scalar, kMost> d{};
-  for (std::size_t i = 0; i < n_; ++i) d[i] = k_[i] - Scalar{1};
+  for (std::size_t i = 0; i < n_; ++i) d[i] = k_[i] - reference_[i];
   const auto whitened = solve(d);
   Scalar total{0};
   for (std::size_t i = 0; i < n_; ++i) total += whitened[i] * whitened[i];
@@ -244,7 +264,8 @@ LossOfEffectivenessFilter<Scalar, kMost>::single_faults() const noexcept {
       information += direction[m] * direction[m];
       projection += direction[m] * whitened[m];
     }
-    faults[i] = {Scalar{1} + projection / information, Scalar{1} / information,
+    faults[i] = {Scalar{1} + projection / (reference_[i] * information),
+                 Scalar{1} / (reference_[i] * reference_[i] * information),
                  total - projection * projection / information};  // (6)
   }
   return faults;

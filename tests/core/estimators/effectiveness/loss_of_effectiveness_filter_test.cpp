@@ -228,6 +228,66 @@ TEST(LossOfEffectivenessFilter, ReadsWhatIsLeftOfOneRotor) {
   }
 }
 
+TEST(LossOfEffectivenessFilter, MeasuresAFaultFromWhatTheFlightShowedBefore) {
+  // The vehicle file promises a quarter more than the rotors give: a rotor that gives 0.2 of its own is not below 0.25 of
+  // what the file says by much, and one that gives all of its own is not whole.
+  const auto matrix = EffectivenessMatrix<double>::of(ring(6));
+  LossOfEffectivenessFilter<double> filter{matrix, general()};
+  LossOfEffectivenessFilter<double> without{matrix, general()};
+  Flight flight{matrix, 3};
+  Flight same{matrix, 3};
+  std::vector<double> k(6, 0.8);
+  for (int i = 0; i < 5000; ++i) {
+    static_cast<void>(flight.step(filter, k));
+    filter.learn_reference(kStep_s);
+    static_cast<void>(same.step(without, k));
+  }
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR((*filter.single_faults())[i].effectiveness, 1.0, 0.01);
+    EXPECT_NEAR(filter.reference(i), filter.effectiveness(i), 0.01);
+    EXPECT_EQ(without.reference(i), 1.0);
+  }
+  k[2] = 0.5 * 0.8;
+  for (int i = 0; i < 100; ++i) {
+    static_cast<void>(flight.step(filter, k));
+    static_cast<void>(same.step(without, k));
+  }
+  const auto learned = (*filter.single_faults())[2];
+  EXPECT_NEAR(learned.effectiveness, 0.5, 0.03);
+  EXPECT_LT(learned.unexplained, 0.01 * (*without.single_faults())[2].unexplained);
+  // The share that is left unexplained does not depend on what the deviation is measured in.
+  const double explained = (1.0 - learned.effectiveness) * (1.0 - learned.effectiveness) / learned.variance;
+  EXPECT_LT(learned.unexplained, 0.01 * explained);
+}
+
+TEST(LossOfEffectivenessFilter, TheReferenceIsAMeanThatForgetsAndHasALeast) {
+  EffectivenessMatrix<double> matrix;
+  matrix.rotor_count = 1;
+  matrix.per_speed2[kVerticalRow][0] = -1e-5;
+  auto params = LossOfEffectivenessParams<double>{};
+  params.reference_memory_s = 1.0;
+  LossOfEffectivenessFilter<double> filter{matrix, params};
+  const std::array speed{1000.0};
+  const auto fly = [&](double k) {
+    static_cast<void>(filter.update(kStep_s, speed, {}, -10.0 * k));
+    filter.learn_reference(kStep_s);
+  };
+  // At first the mean of all steps, whatever it was before them.
+  for (int i = 0; i < 100; ++i) fly(0.9);
+  EXPECT_NEAR(filter.reference(0), 0.9, 0.005);
+  // One memory later 1/e of what was is left.
+  for (int i = 0; i < 1000; ++i) fly(0.9);
+  for (int i = 0; i < 520; ++i) fly(1.2);
+  EXPECT_NEAR(filter.reference(0), 1.2 - 0.3 * std::exp(-1.0), 0.01);
+  for (int i = 0; i < 5000; ++i) fly(0.1);
+  EXPECT_EQ(filter.reference(0), 0.5);
+  const double before = filter.reference(0);
+  filter.learn_reference(0.0);
+  filter.learn_reference(-1.0);
+  filter.learn_reference(std::nan(""));
+  EXPECT_EQ(filter.reference(0), before);
+}
+
 TEST(LossOfEffectivenessFilter, RenumberingTheRotorsRenumbersTheAnswer) {
   const std::array<std::size_t, 6> order{3, 0, 5, 1, 4, 2};
   const Multirotor vehicle = ring(6);
