@@ -10,28 +10,20 @@
 #include "core/detectors/effectiveness/effectiveness_monitor.h"
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "tests/support/reference/dense_effectiveness_filter.h"
+#include "tests/support/rotor_ring.h"
 
 namespace airworthy::bench {
 
 inline constexpr double kHover_rad_s = 640.0;
 
+/// With propellers and limits, which the whole detector asks for.
 inline Multirotor ring(std::size_t rotors) {
-  Multirotor vehicle;
-  vehicle.mass_kg = 0.5;
-  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
-  vehicle.thrust_coefficient_N_s2 = 8e-6 / static_cast<double>(rotors);
-  vehicle.torque_ratio_m = 0.012;
+  Multirotor vehicle = test::bebop_ring(rotors);
   vehicle.propeller_radius_m = 0.07;
   vehicle.propeller_inertia_kg_m2 = 5e-6;
   vehicle.motor_time_constant_s = 0.02;
   vehicle.speed_min_rad_s = 100.0;
   vehicle.speed_max_rad_s = 1300.0;
-  vehicle.rotor_count = rotors;
-  for (std::size_t i = 0; i < rotors; ++i) {
-    const double angle = 6.283185307179586 * (static_cast<double>(i) + 0.5) / static_cast<double>(rotors);
-    vehicle.rotor[i].position_m = {0.14 * std::cos(angle), 0.14 * std::sin(angle), -0.01};
-    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-  }
   return vehicle;
 }
 
