@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 
+#include "bench/methods.h"
 #include "core/detectors/effectiveness/effectiveness_monitor.h"
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "tests/support/reference/dense_effectiveness_filter.h"
@@ -152,29 +153,15 @@ struct DetectorSteps {
   }
 };
 
-/// Calls `run` with the steps of a method, by its name in the table of benchmarks; false if there is none.
-template <std::size_t N, class Run>
-bool with_steps(const std::string_view method, const Run& run) {
-  if (method == "filter_double") {
-    run(FilterSteps<double, N>{});
-  } else if (method == "filter_float") {
-    run(FilterSteps<float, N>{});
-  } else if (method == "textbook_filter") {
-    run(TextbookFilterSteps<N>{});
-  } else if (method == "by_hand_filter") {
-    run(ByHandFilterSteps<N>{});
-  } else if (method == "detector_sample") {
-    run(DetectorSteps<N>{});
-  } else {
-    return false;
-  }
-  return true;
-}
-
-template <class Run>
-bool with_steps(const std::string_view method, std::int64_t rotors, const Run& run) {
-  return (rotors == 4 && with_steps<4>(method, run)) || (rotors == 6 && with_steps<6>(method, run)) ||
-         (rotors == 8 && with_steps<8>(method, run));
-}
+/// Calls run(steps) for a method and a number of rotors; false if there are none.
+constexpr auto with_steps = [](std::string_view method, std::int64_t rotors, const auto& run) {
+  return with_rotor_count(rotors, [&](auto count) {
+    constexpr std::size_t kN = count;
+    return run_method(
+        method, run, Method<FilterSteps<double, kN>>{"filter_double"},
+        Method<FilterSteps<float, kN>>{"filter_float"}, Method<TextbookFilterSteps<kN>>{"textbook_filter"},
+        Method<ByHandFilterSteps<kN>>{"by_hand_filter"}, Method<DetectorSteps<kN>>{"detector_sample"});
+  });
+};
 
 }  // namespace airworthy::bench
