@@ -5,14 +5,10 @@
 #include <string>
 
 #include "bench/actuator_steps.h"
+#include "bench/time_steps.h"
 
 namespace airworthy::bench {
 namespace {
-
-template <class Steps>
-void time_steps(benchmark::State& state, Steps& steps) {
-  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(steps.step());
-}
 
 template <int kStates, int kInputs, int kOutputs>
 void add_size() {
@@ -27,23 +23,16 @@ void add_size() {
   }
 }
 
-void monitor_sample(benchmark::State& state) {
-  MonitorSteps steps{static_cast<std::size_t>(state.range(0))};
-  time_steps(state, steps);
-}
-BENCHMARK(monitor_sample)->Arg(4)->Arg(6)->Arg(8);
-
 }  // namespace
 }  // namespace airworthy::bench
 
 int main(int argc, char** argv) {
-  using airworthy::bench::add_size;
+  using namespace airworthy::bench;
+  add_methods({"monitor_sample"}, with_steps);
   add_size<2, 1, 1>();
   add_size<4, 4, 4>();
   add_size<8, 4, 4>();
   add_size<8, 6, 4>();
   add_size<8, 8, 4>();
-  benchmark::Initialize(&argc, argv);
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return run_benchmarks(argc, argv);
 }

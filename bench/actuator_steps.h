@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "bench/methods.h"
 #include "core/detectors/actuator/actuator_monitor.h"
 #include "core/estimators/actuator/multi_stage_observer.h"
 #include "tests/support/hovering_multirotor.h"
@@ -66,58 +67,45 @@ struct AugmentedSteps {
   }
 };
 
-/// Calls `run` with the steps of a method for one size; false if there is none of that name.
+/// Calls run(steps) for a method and one size; false if there is none of that name.
 template <int kStates, int kInputs, int kOutputs, class Run>
-bool with_steps_of_size(const std::string_view method, const Run& run) {
-  if (method == "multi_stage") {
-    run(MultiStageSteps<kStates, kInputs, kOutputs>{});
-  } else if (method == "textbook_augmented") {
-    run(AugmentedSteps<reference::AugmentedFaultFilter<double>, kStates, kInputs, kOutputs>{});
-  } else if (method == "symmetric_augmented") {
-    run(AugmentedSteps<reference::ThriftyFaultFilter<double, kStates, kInputs, kOutputs, false>, kStates,
-                       kInputs, kOutputs>{});
-  } else if (method == "blockwise_augmented") {
-    run(AugmentedSteps<reference::ThriftyFaultFilter<double, kStates, kInputs, kOutputs, true>, kStates,
-                       kInputs, kOutputs>{});
-  } else {
-    return false;
-  }
-  return true;
+bool with_steps_of_size(std::string_view method, const Run& run) {
+  using Symmetric = reference::ThriftyFaultFilter<double, kStates, kInputs, kOutputs, false>;
+  using Blockwise = reference::ThriftyFaultFilter<double, kStates, kInputs, kOutputs, true>;
+  using Textbook = reference::AugmentedFaultFilter<double>;
+  return run_method(method, run, Method<MultiStageSteps<kStates, kInputs, kOutputs>>{"multi_stage"},
+                    Method<AugmentedSteps<Textbook, kStates, kInputs, kOutputs>>{"textbook_augmented"},
+                    Method<AugmentedSteps<Symmetric, kStates, kInputs, kOutputs>>{"symmetric_augmented"},
+                    Method<AugmentedSteps<Blockwise, kStates, kInputs, kOutputs>>{"blockwise_augmented"});
 }
 
 /// One inertial sample of the whole detector: observers of rotors and axes, and the verdicts.
+template <std::size_t N>
 struct MonitorSteps {
-  explicit MonitorSteps(std::size_t count) : rotors{count}, body{count, 1} {}
-
   static actuator::ActuatorMonitorParams params(const Multirotor& vehicle) {
     actuator::ActuatorMonitorParams result;
     result.vehicle = vehicle;
     return result;
   }
 
-  std::size_t rotors;
-  test::HoveringMultirotor body;
+  test::HoveringMultirotor body{N, 1};
   actuator::ActuatorMonitor monitor{params(body.vehicle)};
 
   double step() {
     body.step();
     const TimePoint now = TimePoint{} + from_seconds(body.time_s);
-    monitor.on_rotor_commands(now, std::span{body.command_ratio}.first(rotors));
+    monitor.on_rotor_commands(now, std::span{body.command_ratio}.template first<N>());
     static_cast<void>(monitor.on_imu({now, body.accel_m_s2, body.gyro_rad_s}, Phase::kInFlight));
     return monitor.nis();
   }
 };
 
-/// The same for the observer of a vehicle with 4, 6 or 8 rotors: eight states, four outputs.
-template <class Run>
-bool with_steps(const std::string_view method, std::int64_t rotors, const Run& run) {
-  if (method == "monitor_sample" && (rotors == 4 || rotors == 6 || rotors == 8)) {
-    run(MonitorSteps{static_cast<std::size_t>(rotors)});
-    return true;
-  }
-  return (rotors == 4 && with_steps_of_size<8, 4, 4>(method, run)) ||
-         (rotors == 6 && with_steps_of_size<8, 6, 4>(method, run)) ||
-         (rotors == 8 && with_steps_of_size<8, 8, 4>(method, run));
-}
+/// Calls run(steps) for a method and a number of rotors, with eight states and four outputs; false if there are none.
+constexpr auto with_steps = [](std::string_view method, std::int64_t rotors, const auto& run) {
+  return with_rotor_count(rotors, [&](auto count) {
+    return run_method(method, run, Method<MonitorSteps<count>>{"monitor_sample"}) ||
+           with_steps_of_size<8, static_cast<int>(count), 4>(method, run);
+  });
+};
 
 }  // namespace airworthy::bench

@@ -7,31 +7,24 @@
 #include <span>
 #include <string_view>
 
+#include "bench/methods.h"
 #include "core/detectors/effectiveness/effectiveness_monitor.h"
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "tests/support/reference/dense_effectiveness_filter.h"
+#include "tests/support/rotor_ring.h"
 
 namespace airworthy::bench {
 
 inline constexpr double kHover_rad_s = 640.0;
 
+/// With propellers and limits, which the whole detector asks for.
 inline Multirotor ring(std::size_t rotors) {
-  Multirotor vehicle;
-  vehicle.mass_kg = 0.5;
-  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
-  vehicle.thrust_coefficient_N_s2 = 8e-6 / static_cast<double>(rotors);
-  vehicle.torque_ratio_m = 0.012;
+  Multirotor vehicle = test::bebop_ring(rotors);
   vehicle.propeller_radius_m = 0.07;
   vehicle.propeller_inertia_kg_m2 = 5e-6;
   vehicle.motor_time_constant_s = 0.02;
   vehicle.speed_min_rad_s = 100.0;
   vehicle.speed_max_rad_s = 1300.0;
-  vehicle.rotor_count = rotors;
-  for (std::size_t i = 0; i < rotors; ++i) {
-    const double angle = 6.283185307179586 * (static_cast<double>(i) + 0.5) / static_cast<double>(rotors);
-    vehicle.rotor[i].position_m = {0.14 * std::cos(angle), 0.14 * std::sin(angle), -0.01};
-    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-  }
   return vehicle;
 }
 
@@ -160,29 +153,15 @@ struct DetectorSteps {
   }
 };
 
-/// Calls `run` with the steps of a method, by its name in the table of benchmarks; false if there is none.
-template <std::size_t N, class Run>
-bool with_steps(const std::string_view method, const Run& run) {
-  if (method == "filter_double") {
-    run(FilterSteps<double, N>{});
-  } else if (method == "filter_float") {
-    run(FilterSteps<float, N>{});
-  } else if (method == "textbook_filter") {
-    run(TextbookFilterSteps<N>{});
-  } else if (method == "by_hand_filter") {
-    run(ByHandFilterSteps<N>{});
-  } else if (method == "detector_sample") {
-    run(DetectorSteps<N>{});
-  } else {
-    return false;
-  }
-  return true;
-}
-
-template <class Run>
-bool with_steps(const std::string_view method, std::int64_t rotors, const Run& run) {
-  return (rotors == 4 && with_steps<4>(method, run)) || (rotors == 6 && with_steps<6>(method, run)) ||
-         (rotors == 8 && with_steps<8>(method, run));
-}
+/// Calls run(steps) for a method and a number of rotors; false if there are none.
+constexpr auto with_steps = [](std::string_view method, std::int64_t rotors, const auto& run) {
+  return with_rotor_count(rotors, [&](auto count) {
+    constexpr std::size_t kN = count;
+    return run_method(
+        method, run, Method<FilterSteps<double, kN>>{"filter_double"},
+        Method<FilterSteps<float, kN>>{"filter_float"}, Method<TextbookFilterSteps<kN>>{"textbook_filter"},
+        Method<ByHandFilterSteps<kN>>{"by_hand_filter"}, Method<DetectorSteps<kN>>{"detector_sample"});
+  });
+};
 
 }  // namespace airworthy::bench

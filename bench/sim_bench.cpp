@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <numbers>
 #include <string>
 
 #include "runtime/bus/log_writer.h"
@@ -13,6 +12,7 @@
 #include "sim/config/realism.h"
 #include "sim/output/log_output.h"
 #include "sim/simulation.h"
+#include "tests/support/rotor_ring.h"
 
 namespace airworthy::sim {
 namespace {
@@ -23,15 +23,7 @@ constexpr double kFlown_s = 2.0;  // of one iteration
 Multirotor vehicle_with(std::size_t rotors) {
   const auto file = rt::VehicleFile::load(std::string{AIRWORTHY_CONFIG} + "/vehicles/f450.toml");
   Multirotor vehicle = file.value().multirotor.value();
-  constexpr double kArm_m = 0.225;
-  vehicle.rotor_count = rotors;
-  for (std::size_t i = 0; i < rotors; ++i) {
-    const double azimuth =
-        2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(rotors);
-    vehicle.rotor[i] = {{kArm_m * std::cos(azimuth), kArm_m * std::sin(azimuth), -0.02},
-                        {0.0, 0.0, -1.0},
-                        i % 2 == 0 ? 1 : -1};
-  }
+  test::put_on_ring(vehicle, rotors, 0.225, -0.02);
   vehicle.thrust_coefficient_N_s2 *= 4.0 / static_cast<double>(rotors);
   return vehicle;
 }

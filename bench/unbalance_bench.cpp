@@ -2,29 +2,11 @@
 // run-time size, every product in full) and as a programmer writes it for one size of arrays, in the same run.
 #include <benchmark/benchmark.h>
 
+#include "bench/time_steps.h"
 #include "bench/unbalance_steps.h"
 
 namespace airworthy::bench {
 namespace {
-
-void time_steps(benchmark::State& state, const char* method) {
-  with_steps(method, state.range(0), [&state](auto steps) {
-    for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(steps.step());
-  });
-}
-
-void signal_power_double(benchmark::State& state) { time_steps(state, "signal_power_double"); }
-void signal_power_float(benchmark::State& state) { time_steps(state, "signal_power_float"); }
-void rotor_bands_double(benchmark::State& state) { time_steps(state, "rotor_bands_double"); }
-void rotor_bands_float(benchmark::State& state) { time_steps(state, "rotor_bands_float"); }
-void textbook_signal_power(benchmark::State& state) { time_steps(state, "textbook_signal_power"); }
-void signal_power_by_hand(benchmark::State& state) { time_steps(state, "signal_power_by_hand"); }
-BENCHMARK(signal_power_double)->Arg(4)->Arg(6)->Arg(8);
-BENCHMARK(signal_power_float)->Arg(4)->Arg(6)->Arg(8);
-BENCHMARK(rotor_bands_double)->Arg(4)->Arg(6)->Arg(8);
-BENCHMARK(rotor_bands_float)->Arg(4)->Arg(6)->Arg(8);
-BENCHMARK(textbook_signal_power)->Arg(4)->Arg(6)->Arg(8);
-BENCHMARK(signal_power_by_hand)->Arg(4)->Arg(6)->Arg(8);
 
 // What a report costs on top, at its own rate.
 void signal_power_report(benchmark::State& state) {
@@ -34,9 +16,15 @@ void signal_power_report(benchmark::State& state) {
     benchmark::DoNotOptimize(steps.ekf.isolation());
   }
 }
-BENCHMARK(signal_power_report);
 
 }  // namespace
 }  // namespace airworthy::bench
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  using namespace airworthy::bench;
+  add_methods({"signal_power_double", "signal_power_float", "rotor_bands_double", "rotor_bands_float",
+               "textbook_signal_power", "signal_power_by_hand"},
+              with_steps);
+  benchmark::RegisterBenchmark("signal_power_report", signal_power_report);
+  return run_benchmarks(argc, argv);
+}

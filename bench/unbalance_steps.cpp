@@ -4,8 +4,5 @@
 #include "bench/count_steps.h"
 
 int main(int argc, char** argv) {
-  return airworthy::bench::count_steps(argc, argv, "unbalance_steps",
-                                       [](const char* method, std::int64_t size, const auto& run) {
-                                         return airworthy::bench::with_steps(method, size, run);
-                                       });
+  return airworthy::bench::count_steps(argc, argv, "unbalance_steps", airworthy::bench::with_steps);
 }

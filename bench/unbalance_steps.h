@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "bench/methods.h"
 #include "core/estimators/unbalance/rotor_bands.h"
 #include "core/estimators/unbalance/signal_power_ekf.h"
 #include "tests/support/reference/dense_signal_power_ekf.h"
@@ -144,31 +145,17 @@ struct ByHandSteps {
   }
 };
 
-/// Calls `run` with the steps of a method, by its name in the table of benchmarks; false if there is none.
-template <std::size_t N, class Run>
-bool with_steps(const std::string_view method, const Run& run) {
-  if (method == "signal_power_double") {
-    run(SignalPowerSteps<double, N>{});
-  } else if (method == "signal_power_float") {
-    run(SignalPowerSteps<float, N>{});
-  } else if (method == "rotor_bands_double") {
-    run(SignalPowerSteps<double, N, RotorBands<double, N>>{});
-  } else if (method == "rotor_bands_float") {
-    run(SignalPowerSteps<float, N, RotorBands<float, N>>{});
-  } else if (method == "textbook_signal_power") {
-    run(TextbookSteps<N>{});
-  } else if (method == "signal_power_by_hand") {
-    run(ByHandSteps<N>{});
-  } else {
-    return false;
-  }
-  return true;
-}
-
-template <class Run>
-bool with_steps(const std::string_view method, std::int64_t rotors, const Run& run) {
-  return (rotors == 4 && with_steps<4>(method, run)) || (rotors == 6 && with_steps<6>(method, run)) ||
-         (rotors == 8 && with_steps<8>(method, run));
-}
+/// Calls run(steps) for a method and a number of rotors; false if there are none.
+constexpr auto with_steps = [](std::string_view method, std::int64_t rotors, const auto& run) {
+  return with_rotor_count(rotors, [&](auto count) {
+    constexpr std::size_t kN = count;
+    return run_method(method, run, Method<SignalPowerSteps<double, kN>>{"signal_power_double"},
+                      Method<SignalPowerSteps<float, kN>>{"signal_power_float"},
+                      Method<SignalPowerSteps<double, kN, RotorBands<double, kN>>>{"rotor_bands_double"},
+                      Method<SignalPowerSteps<float, kN, RotorBands<float, kN>>>{"rotor_bands_float"},
+                      Method<TextbookSteps<kN>>{"textbook_signal_power"},
+                      Method<ByHandSteps<kN>>{"signal_power_by_hand"});
+  });
+};
 
 }  // namespace airworthy::bench

@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "core/vehicle/multirotor.h"
+#include "tests/support/rotor_ring.h"
 
 namespace airworthy::test {
 
@@ -25,13 +25,7 @@ class HoveringMultirotor {
     vehicle.motor_time_constant_s = 0.04;
     vehicle.speed_min_rad_s = 100;
     vehicle.speed_max_rad_s = 1000;
-    vehicle.rotor_count = rotors;
-    for (std::size_t i = 0; i < rotors; ++i) {
-      const double angle =
-          2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(rotors);
-      vehicle.rotor[i].position_m = {0.2 * std::cos(angle), 0.2 * std::sin(angle), 0.0};
-      vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-    }
+    put_on_ring(vehicle, rotors, 0.2);
     hover_rad_s_ = std::sqrt(vehicle.mass_kg * kGravity_m_s2 /
                              (static_cast<double>(rotors) * vehicle.thrust_coefficient_N_s2));
     speed_rad_s.fill(hover_rad_s_);

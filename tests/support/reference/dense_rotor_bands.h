@@ -3,14 +3,15 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <complex>
-#include <numbers>
 #include <vector>
+
+#include "tests/support/reference/dense_power_filter.h"
 
 namespace airworthy::test {
 
 /// The signal-power filter in bands that follow the rotors, as a textbook writes it: complex numbers, matrices of
 /// run-time size, one joint update with the full innovation covariance. For comparison only.
-class DenseRotorBands {
+class DenseRotorBands : public DensePowerFilter {
  public:
   struct Params {
     double reference_m = 0.0;  ///< U₀/m
@@ -23,31 +24,21 @@ class DenseRotorBands {
   };
 
   explicit DenseRotorBands(const Params& params)
-      : params_{params},
-        n_{static_cast<Eigen::Index>(params.spin.size())},
-        x{Eigen::VectorXd::Zero(n_ + 1)},
-        p{params.sigma * params.sigma * Eigen::MatrixXd::Identity(n_ + 1, n_ + 1)},
+      : DensePowerFilter{static_cast<Eigen::Index>(params.spin.size()) + 1},
+        params_{params},
+        n_{x.size() - 1},
         information{Eigen::MatrixXd::Zero(n_ + 1, n_ + 1)},
         explained{Eigen::VectorXd::Zero(n_ + 1)},
         y_{Eigen::VectorXcd::Zero(n_)},
         phase_{Eigen::VectorXd::Zero(n_)},
         correlation_{Eigen::MatrixXcd::Zero(n_, n_)},
         gain_{Eigen::MatrixXd::Zero(n_, n_)},
-        noise_{Eigen::VectorXd::Zero(n_)} {}
+        noise_{Eigen::VectorXd::Zero(n_)} {
+    p.diagonal().setConstant(params.sigma * params.sigma);
+  }
 
   void update(double time_s, double ax_m_s2, double ay_m_s2, const Eigen::VectorXd& given_rad_s) {
-    const Eigen::Vector2d a{ax_m_s2, ay_m_s2};
-    if (!begun_) {
-      begun_ = true;
-      start_s_ = time_s;
-    } else {
-      const double dt = time_s - time_s_;
-      const double pole = std::exp(-2.0 * std::numbers::pi * dt);
-      passed_ = pole * passed_ + 0.5 * (1.0 + pole) * (a - last_);
-      step(dt, given_rad_s, time_s - start_s_ >= 3.0 / (2.0 * std::numbers::pi));
-    }
-    time_s_ = time_s;
-    last_ = a;
+    if (pass(time_s, {ax_m_s2, ay_m_s2})) step(dt_s(), given_rad_s, has_settled());
   }
 
   [[nodiscard]] Eigen::VectorXd powers() const { return information.fullPivLu().solve(explained).head(n_); }
@@ -58,12 +49,9 @@ class DenseRotorBands {
   Eigen::Index n_;
 
  public:
-  Eigen::VectorXd x;
-  Eigen::MatrixXd p;
   Eigen::MatrixXd information;
   Eigen::VectorXd explained;
   double scale = 1.0;
-  double nis = 0.0;
 
  private:
   void step(double dt, const Eigen::VectorXd& given_rad_s, bool fuses) {
@@ -76,7 +64,7 @@ class DenseRotorBands {
       const double kappa = 1.0 - std::exp(-params_.speed_error * speed(i) * dt);
       const double own = params_.spin[static_cast<std::size_t>(i)] * speed(i);
       phase_(i) += own * dt;
-      y_(i) += kappa * (Complex{passed_.x(), passed_.y()} * std::polar(1.0, -phase_(i)) - y_(i));
+      y_(i) += kappa * (Complex{passed().x(), passed().y()} * std::polar(1.0, -phase_(i)) - y_(i));
       noise_(i) = std::pow(1.0 - kappa, 2) * noise_(i) + 2.0 * kappa * kappa;
       z(i) = std::norm(y_(i));
       felt(i) = std::imag(std::conj(before(i)) * y_(i));
@@ -107,8 +95,7 @@ class DenseRotorBands {
     const Eigen::MatrixXd s = jacobian * p * jacobian.transpose() + Eigen::MatrixXd{r.asDiagonal()};
     const Eigen::MatrixXd k = p * jacobian.transpose() * s.inverse();
     nis = (z - h).dot(s.inverse() * (z - h)) / static_cast<double>(n_);
-    x += k * (z - h);
-    p = (Eigen::MatrixXd::Identity(n_ + 1, n_ + 1) - k * jacobian) * p;
+    correct(k, jacobian, z - h);
 
     felt_ += dt / (dt + 0.5) * (z.sum() - felt_);
     modelled_ += dt / (dt + 0.5) * (h.sum() - modelled_);
@@ -131,11 +118,6 @@ class DenseRotorBands {
     }
   }
 
-  bool begun_ = false;
-  double start_s_ = 0.0;
-  double time_s_ = 0.0;
-  Eigen::Vector2d last_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d passed_ = Eigen::Vector2d::Zero();
   Eigen::VectorXcd y_;
   Eigen::VectorXd phase_;
   Eigen::MatrixXcd correlation_;

@@ -2,14 +2,14 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <numbers>
-#include <vector>
+
+#include "tests/support/reference/dense_power_filter.h"
 
 namespace airworthy::test {
 
 /// The signal-power filter as a textbook writes an extended Kalman filter: matrices of run-time size, every product
 /// in full, the library's exponential, forces and Δ₀ as the source has them. For comparison only.
-class DenseSignalPowerEkf {
+class DenseSignalPowerEkf : public DensePowerFilter {
  public:
   struct Params {
     Eigen::Index rotors = 4;
@@ -23,10 +23,7 @@ class DenseSignalPowerEkf {
     double r0_power_of_length = 4.0;            ///< r₀ in m⁴/s⁸; 2 as printed, m²/s⁴
   };
 
-  explicit DenseSignalPowerEkf(const Params& params)
-      : params_{params},
-        x{Eigen::VectorXd::Zero(params.rotors + 1)},
-        p{Eigen::MatrixXd::Zero(x.size(), x.size())} {
+  explicit DenseSignalPowerEkf(const Params& params) : DensePowerFilter{params.rotors + 1}, params_{params} {
     p.diagonal().setConstant(0.01);
     p(params.rotors, params.rotors) = 0.05 * 0.05;
     q_ = Eigen::MatrixXd::Zero(x.size(), x.size());
@@ -36,29 +33,11 @@ class DenseSignalPowerEkf {
 
   void update(double time_s, double ax_m_s2, double ay_m_s2, const Eigen::VectorXd& speed_rad_s) {
     const Eigen::Vector2d a{ax_m_s2 / params_.length_unit_m, ay_m_s2 / params_.length_unit_m};
-    if (!begun_) {
-      begun_ = true;
-      start_s_ = time_s;
-    } else {
-      const double dt = time_s - time_s_;
-      const double pole = std::exp(-2.0 * std::numbers::pi * dt);
-      passed_ = pole * passed_ + 0.5 * (1.0 + pole) * (a - last_);
-      if (time_s - start_s_ >= 3.0 / (2.0 * std::numbers::pi)) fuse(dt, passed_.squaredNorm(), speed_rad_s);
-    }
-    time_s_ = time_s;
-    last_ = a;
+    if (pass(time_s, a) && has_settled()) fuse(dt_s(), passed().squaredNorm(), speed_rad_s);
   }
 
   Eigen::Index rotors() const { return params_.rotors; }
   double tip_mass_mg(Eigen::Index rotor) const { return params_.tip_mass_mg * std::exp(x(rotor)); }
-  double nis = 0.0;
-
- private:
-  Params params_;
-
- public:
-  Eigen::VectorXd x;
-  Eigen::MatrixXd p;
 
  private:
   void fuse(double dt, double z, const Eigen::VectorXd& speed_rad_s) {
@@ -87,16 +66,11 @@ class DenseSignalPowerEkf {
     const Eigen::VectorXd k =
         p * jacobian.transpose() * (params_.inverts_innovation_covariance ? 1.0 / s : s);
     nis = (z - h) * (z - h) / s;
-    x += k * (z - h);
-    p = (Eigen::MatrixXd::Identity(n + 1, n + 1) - k * jacobian) * p;
+    correct(k, jacobian, z - h);
   }
 
+  Params params_;
   Eigen::MatrixXd q_;
-  bool begun_ = false;
-  double start_s_ = 0.0;
-  double time_s_ = 0.0;
-  Eigen::Vector2d last_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d passed_ = Eigen::Vector2d::Zero();
 };
 
 }  // namespace airworthy::test

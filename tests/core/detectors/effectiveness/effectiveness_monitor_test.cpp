@@ -4,39 +4,23 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "tests/support/allocation_guard.h"
+#include "tests/support/hovering_quad.h"
 
 namespace airworthy::effectiveness {
 namespace {
 
 constexpr double kStep_s = 0.002;
-constexpr double kHover_rad_s = 640.0;
-
-Multirotor quad() {
-  Multirotor vehicle;
-  vehicle.mass_kg = 0.5;
-  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
-  vehicle.thrust_coefficient_N_s2 = 0.5 * 9.81 / (4.0 * kHover_rad_s * kHover_rad_s);
-  vehicle.propeller_radius_m = 0.07;
-  vehicle.motor_time_constant_s = 0.02;
-  vehicle.speed_min_rad_s = 100.0;
-  vehicle.speed_max_rad_s = 1300.0;
-  vehicle.rotor_count = 4;
-  constexpr std::array<std::array<double, 2>, 4> kPlaces{
-      {{0.1, -0.1}, {0.1, 0.1}, {-0.1, 0.1}, {-0.1, -0.1}}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    vehicle.rotor[i].position_m = {kPlaces[i][0], kPlaces[i][1], 0.0};
-    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-  }
-  return vehicle;
-}
 
 EffectivenessParams params() {
   EffectivenessParams result;
-  result.vehicle = quad();
+  result.vehicle = test::HoveringQuad::described();
+  result.vehicle.propeller_radius_m = 0.07;
+  result.vehicle.motor_time_constant_s = 0.02;
+  result.vehicle.speed_min_rad_s = 100.0;
+  result.vehicle.speed_max_rad_s = 1300.0;
   result.effectiveness = EffectivenessMatrix<double>::of(result.vehicle);
   result.speeds = {
       .rotor_count = 4, .time_constant_s = 0.02, .speed_min_rad_s = 100.0, .speed_max_rad_s = 1300.0};
@@ -45,68 +29,37 @@ EffectivenessParams params() {
 }
 
 /// Hover of a body that answers exactly as described, with white noise of the sensors.
-class Hover {
+class Hover : public test::HoveringQuad {
  public:
-  explicit Hover(const EffectivenessParams& described = params()) : monitor{described} {}
+  explicit Hover(const EffectivenessParams& given = params()) : HoveringQuad{17}, monitor{given} {}
 
   EffectivenessMonitor monitor;
-  std::array<double, 4> effectiveness{1.0, 1.0, 1.0, 1.0};
   std::array<double, 3> push_m_s2{};
   Phase phase = Phase::kInFlight;
   Duration inertial_late{0};  ///< how much later than the speeds the inertial data are stamped
   double step_s = kStep_s;
-  double wander_ratio = 0.0;  ///< of the speeds, each on its own; then a controller flies
   std::optional<LossEvent> event;
 
   void jump(double seconds) { time_s_ += seconds; }
 
   void fly(double seconds) {
-    const auto matrix = params().effectiveness.per_speed2;
     for (double t = 0.0; t < seconds && !event; t += step_s) {
       time_s_ += step_s;
       std::array<double, 4> speed{};
-      double vertical = 0.0;
-      for (std::size_t i = 0; i < 4; ++i) {
-        const double turning = kHover_rad_s * (1.0 + wander(i));
-        speed[i] = turning + 0.5 * normal_(random_);
-        const double thrust = effectiveness[i] * turning * turning;
-        for (std::size_t axis = 0; axis < 2; ++axis) rate_[axis] += step_s * matrix[axis][i] * thrust;
-        vertical += matrix[kVerticalRow][i] * thrust;
-      }
+      step(step_s, [&](std::size_t i, double speed_rad_s) { speed[i] = speed_rad_s + noise(0.5); });
       event = monitor.on_speeds(now(), speed);
       if (event) return;
-      event = monitor.on_imu(now() + inertial_late,
-                             {push_m_s2[0] + 0.3 * normal_(random_), push_m_s2[1] + 0.3 * normal_(random_),
-                              vertical + push_m_s2[2] + 0.5 * normal_(random_)},
-                             {rate_[0] + 0.02 * normal_(random_), rate_[1] + 0.02 * normal_(random_), 0.0},
-                             phase);
+      event = monitor.on_imu(
+          now() + inertial_late,
+          {push_m_s2[0] + noise(0.3), push_m_s2[1] + noise(0.3), push_m_s2[2] + measured_vertical_m_s2()},
+          measured_rates_rad_s(), phase);
     }
   }
 
   [[nodiscard]] TimePoint now() const { return from_us(1'000'000 + std::llround(time_s_ * 1e6)); }
 
  private:
-  /// Change of a rotor's speed, as a ratio: its own, and a controller's that keeps the body level.
-  double wander(std::size_t i) {
-    if (!(wander_ratio > 0.0)) return 0.0;
-    constexpr double kTime_s = 0.15;
-    wander_[i] +=
-        step_s / kTime_s * -wander_[i] + wander_ratio * std::sqrt(2.0 * step_s / kTime_s) * normal_(random_);
-    double ratio = wander_[i];
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      if (i == 0) angle_[axis] += step_s * rate_[axis];
-      const double sign = params().effectiveness.per_speed2[axis][i] > 0.0 ? 1.0 : -1.0;
-      ratio -= sign * (0.02 * rate_[axis] + 0.1 * angle_[axis]);
-    }
-    return ratio;
-  }
-
   double time_s_ = 0.0;
-  std::array<double, 4> wander_{};
-  std::array<double, 2> angle_{};
-  std::array<double, 2> rate_{};
-  std::mt19937 random_{17};
-  std::normal_distribution<> normal_;
 };
 
 TEST(EffectivenessMonitor, FindsEachRotorAndLatches) {

@@ -4,39 +4,23 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "tests/support/allocation_guard.h"
+#include "tests/support/hovering_quad.h"
 
 namespace airworthy::effectiveness {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kStep_s = 0.002;
-constexpr double kHover_rad_s = 640.0;
 constexpr double kLeastExcess = 0.15;
-
-Multirotor quad() {
-  Multirotor vehicle;
-  vehicle.mass_kg = 0.5;
-  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
-  vehicle.thrust_coefficient_N_s2 = 0.5 * 9.81 / (4.0 * kHover_rad_s * kHover_rad_s);
-  vehicle.torque_ratio_m = 0.015;
-  vehicle.propeller_inertia_kg_m2 = 1e-6;
-  vehicle.rotor_count = 4;
-  constexpr std::array<std::array<double, 2>, 4> kPlaces{
-      {{0.1, -0.1}, {0.1, 0.1}, {-0.1, 0.1}, {-0.1, -0.1}}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    vehicle.rotor[i].position_m = {kPlaces[i][0], kPlaces[i][1], 0.0};
-    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-  }
-  return vehicle;
-}
 
 SlowEvidenceParams params() {
   SlowEvidenceParams result;
-  result.vehicle = quad();
+  result.vehicle = test::HoveringQuad::described();
+  result.vehicle.torque_ratio_m = 0.015;
+  result.vehicle.propeller_inertia_kg_m2 = 1e-6;
   result.effectiveness = EffectivenessMatrix<double>::of(result.vehicle);
   result.speeds = {.rotor_count = 4, .speed_max_rad_s = 1300.0};
   result.least_excess_ratio = kLeastExcess;
@@ -44,10 +28,11 @@ SlowEvidenceParams params() {
 }
 
 /// A controlled flight of a body that answers as described but for `effectiveness`; the speeds wander by 5 %.
-class Flight {
+class Flight : public test::HoveringQuad {
  public:
+  Flight() : HoveringQuad{23} { wander_ratio = 0.05; }
+
   SlowEvidence slow{params()};
-  std::array<double, 4> effectiveness{1.0, 1.0, 1.0, 1.0};
   std::array<int, 4> report_every{5, 5, 5, 5};  ///< steps of 2 ms between reports of a rotor; 0: silent
   bool has_gaps = false;                        ///< rotor 2 is silent for 60 ms twice a second
   bool may_accuse = true;
@@ -66,43 +51,23 @@ class Flight {
  private:
   std::optional<SlowEvidence::Excess> step() {
     ++steps_;
-    const auto& matrix = params_.effectiveness.per_speed2;
-    constexpr double kTime_s = 0.15;
     std::array<double, 4> reported{kNaN, kNaN, kNaN, kNaN};
-    std::array<double, 3> gives{};
-    for (std::size_t axis = 0; axis < 2; ++axis) angle_[axis] += kStep_s * rate_[axis];
-    for (std::size_t i = 0; i < 4; ++i) {
-      wander_[i] +=
-          -kStep_s / kTime_s * wander_[i] + 0.05 * std::sqrt(2.0 * kStep_s / kTime_s) * normal_(random_);
-      double ratio = 1.0 + wander_[i];
-      for (std::size_t axis = 0; axis < 2; ++axis)
-        ratio -= std::copysign(1.0, matrix[axis][i]) * (0.02 * rate_[axis] + 0.1 * angle_[axis]);
-      const double speed = kHover_rad_s * ratio;
+    HoveringQuad::step(kStep_s, [&](std::size_t i, double speed_rad_s) {
       const bool is_due =
           report_every[i] > 0 && steps_ % report_every[i] == 0 && !(has_gaps && i == 2 && steps_ % 250 < 30);
-      if (is_due) reported[i] = speed + 0.5 * normal_(random_);
-      constexpr std::array kRows{kRollRow, kPitchRow, kVerticalRow};
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        gives[axis] += effectiveness[i] * matrix[kRows[axis]][i] * speed * speed;
-    }
-    for (std::size_t axis = 0; axis < 2; ++axis) rate_[axis] += kStep_s * gives[axis];
+      if (is_due) reported[i] = speed_rad_s + noise(0.5);
+    });
     slow.on_speeds(now(), reported);
     SlowSample sample;
     sample.time = now();
-    sample.accel_m_s2 = {0.0, 0.0, gives[2] + 0.5 * normal_(random_) + vertical_error_m_s2};
-    sample.gyro_rad_s = {rate_[0] + 0.02 * normal_(random_), rate_[1] + 0.02 * normal_(random_), 0.0};
+    sample.accel_m_s2 = {0.0, 0.0, measured_vertical_m_s2() + vertical_error_m_s2};
+    sample.gyro_rad_s = measured_rates_rad_s();
     sample.is_judged = true;
     sample.may_accuse = may_accuse;
     return slow.on_imu(sample);
   }
 
-  SlowEvidenceParams params_ = params();
   std::int64_t steps_ = 0;
-  std::array<double, 4> wander_{};
-  std::array<double, 2> angle_{};
-  std::array<double, 2> rate_{};
-  std::mt19937 random_{23};
-  std::normal_distribution<> normal_;
 };
 
 TEST(SlowEvidence, FindsTheExcessAndSaysItOnce) {

@@ -3,129 +3,26 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <complex>
 #include <limits>
-#include <random>
 
 #include "tests/support/allocation_guard.h"
+#include "tests/support/unbalanced_quad.h"
 
 namespace airworthy {
 namespace {
 
-using Complex = std::complex<double>;
-using Transition = FaultLifeCycle::Transition;
 using Reason = UnbalanceNotJudged;
-constexpr std::size_t kN = 4;
+constexpr std::size_t kN = test::UnbalancedQuad::kN;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-TimePoint at(double time_s) { return from_us(std::llround((1000.0 + time_s) * 1e6)); }
-
-/// A quadrotor that hovers at 470 rad/s.
-Multirotor quadrotor() {
-  Multirotor vehicle;
-  vehicle.mass_kg = 0.69;
-  vehicle.thrust_coefficient_N_s2 = 7.64e-6;
-  vehicle.rotor_count = kN;
-  for (std::size_t i = 0; i < kN; ++i) vehicle.rotor[i].spin = i < 2 ? -1 : 1;
-  return vehicle;
-}
-
 UnbalanceParams params_with_baseline() {
-  UnbalanceParams params;
-  params.vehicle = quadrotor();
-  params.has_baseline = true;
-  params.baseline_m_s2 = {0.2, 0.3, 0.1, 0.4};
-  params.baseline_sigma_m_s2.fill(0.05);
+  UnbalanceParams params = test::UnbalancedQuad::with_baseline();
   params.most_speed_error_ratio = 0.002;  // as with a calibration
   return params;
 }
 
-/// Flies a vehicle whose rotors wander about means of their own, and keeps what the monitor said.
-struct Flight {
-  explicit Flight(const UnbalanceParams& params = params_with_baseline())
-      : hover_rad_s{UnbalanceMonitor::hover_speed_rad_s(params.vehicle)}, monitor{params} {
-    monitor.on_phase(Phase::kInFlight);
-  }
-
-  void fly(double duration_s) {
-    const double end_s = time_s + duration_s;
-    for (; time_s < end_s - 1e-9; time_s += dt_s) step();
-  }
-
-  void step() {
-    for (std::size_t i = 0; i < kN; ++i) {
-      speed[i] = hover_rad_s + offset_rad_s[i] + wander_rad_s[i] * std::sin((1.0 + rate[i]) * time_s);
-      phase[i] += speed[i] * dt_s;
-    }
-    if (time_s >= next_report_s - 1e-9) {
-      next_report_s += 0.01;
-      std::array<double, kN> told;
-      for (std::size_t i = 0; i < kN; ++i) {
-        told[i] =
-            is_frozen[i] ? 480.0 : speed[i] * telemetry_factor[i] * (1.0 + telemetry_noise * normal(random));
-      }
-      monitor.on_speeds(at(time_s), told);
-    }
-    Complex circle = 0.0;  // x + j·y
-    for (std::size_t i = 0; i < kN; ++i) {
-      const double spin = i < 2 ? -1.0 : 1.0;
-      const double ratio = speed[i] / hover_rad_s;
-      circle += ratio * ratio * (natural[i] + damage[i]) * average(i) *
-                std::polar(1.0, spin * phase[i] + 2.0 * spin);
-    }
-    circle += foreign_m_s2 * std::cos(430.0 * time_s);
-    circle += noise_m_s2 * Complex{normal(random), normal(random)};
-    if (monitor.on_accel(at(time_s), circle.real(), circle.imag(), window_s)) note();
-  }
-
-  [[nodiscard]] double average(std::size_t i) const {
-    const double half = 0.5 * speed[i] * window_s;
-    return half > 0.0 ? std::sin(half) / half : 1.0;
-  }
-
-  void note() {
-    for (std::size_t i = 0; i < kN; ++i) {
-      const Transition transition = monitor.rotors()[i].transition;
-      if (transition == Transition::kRaise) {
-        blamed |= 1U << i;
-        if (found_s < 0.0) found_s = time_s;
-      }
-      if (transition == Transition::kClear) cleared |= 1U << i;
-    }
-    if (monitor.ambiguity() == Transition::kRaise) {
-      is_ambiguous = true;
-      candidates = monitor.candidates();
-    }
-  }
-
-  [[nodiscard]] Reason reason(std::size_t rotor) const { return monitor.rotors()[rotor].reason; }
-
-  double hover_rad_s;
-  RotorUnbalanceMonitor<kN> monitor;
-  std::array<double, kN> natural{0.2, 0.3, 0.1, 0.4};
-  std::array<double, kN> damage{};
-  std::array<double, kN> offset_rad_s{-9.0, -2.0, 4.0, 12.0};
-  std::array<double, kN> wander_rad_s{6.0, 6.0, 6.0, 6.0};
-  std::array<double, kN> rate{0.1, 0.6, 0.3, 0.9};
-  std::array<double, kN> telemetry_factor{1.0, 1.0, 1.0, 1.0};
-  std::array<bool, kN> is_frozen{};
-  double telemetry_noise = 0.003;
-  double noise_m_s2 = 0.4;
-  double foreign_m_s2 = 0.0;  ///< along x at 68 Hz, the speed of no rotor
-  double window_s = 0.0;
-  double dt_s = 0.002;
-  double time_s = 0.0;
-  double next_report_s = 0.0;
-  std::array<double, kN> speed{};
-  std::array<double, kN> phase{};
-  std::mt19937 random{9};
-  std::normal_distribution<double> normal;
-
-  std::uint32_t blamed = 0;
-  std::uint32_t cleared = 0;
-  std::uint32_t candidates = 0;
-  bool is_ambiguous = false;
-  double found_s = -1.0;
+struct Flight : test::UnbalancedQuad {
+  explicit Flight(const UnbalanceParams& params = params_with_baseline()) : UnbalancedQuad{params} {}
 };
 
 TEST(RotorUnbalanceMonitor, IsSilentAboutAHealthyVehicle) {
@@ -136,7 +33,7 @@ TEST(RotorUnbalanceMonitor, IsSilentAboutAHealthyVehicle) {
   EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
   for (std::size_t i = 0; i < kN; ++i) {
     EXPECT_EQ(flight.reason(i), Reason::kJudged);
-    EXPECT_NEAR(flight.monitor.rotors()[i].amplitude_m_s2, flight.natural[i], 0.15);
+    EXPECT_NEAR(flight.rotor(i).amplitude_m_s2, flight.natural[i], 0.15);
   }
 }
 
@@ -149,11 +46,11 @@ TEST(RotorUnbalanceMonitor, BlamesEachRotorForItsOwnDamage) {
     flight.fly(5.0);
     EXPECT_EQ(flight.blamed, 1U << rotor);
     EXPECT_LT(flight.found_s, 12.5);
-    const RotorUnbalance& found = flight.monitor.rotors()[rotor];
+    const RotorUnbalance& found = flight.rotor(rotor);
     EXPECT_NEAR(found.growth_m_s2, 1.2, 0.2);
     EXPECT_GE(found.test_ratio, 1.0);
-    EXPECT_GT(found.onset, at(10.0));
-    EXPECT_LE(found.onset, at(flight.found_s));
+    EXPECT_GT(found.onset, Flight::at(10.0));
+    EXPECT_LE(found.onset, Flight::at(flight.found_s));
   }
 }
 
@@ -203,14 +100,14 @@ TEST(RotorUnbalanceMonitor, OfTwoRotorsOfOneSpeedNobodyIsBlamedAndBothAreNamed) 
     for (const std::size_t damaged : {2U, 3U}) {
       Flight flight;
       flight.offset_rad_s[3] = flight.offset_rad_s[2];
-      flight.rate[3] = flight.rate[2];
+      flight.wander_rate_rad_s[3] = flight.wander_rate_rad_s[2];
       flight.damage[damaged] = size;
       flight.fly(20.0);
       EXPECT_EQ(flight.blamed, 0U) << size;
       EXPECT_EQ(flight.reason(2), Reason::kConfounded);
       EXPECT_EQ(flight.reason(3), Reason::kConfounded);
-      EXPECT_EQ(flight.monitor.rotors()[2].confounded_with, 0b1000U);
-      EXPECT_EQ(flight.monitor.rotors()[3].confounded_with, 0b0100U);
+      EXPECT_EQ(flight.rotor(2).confounded_with, 0b1000U);
+      EXPECT_EQ(flight.rotor(3).confounded_with, 0b0100U);
       EXPECT_EQ(flight.reason(0), Reason::kJudged);
       EXPECT_TRUE(flight.is_ambiguous) << size;
       EXPECT_EQ(flight.candidates, 0b1100U) << size;
@@ -227,7 +124,7 @@ TEST(RotorUnbalanceMonitor, InAStillHoverNobodyIsBlamed) {
   EXPECT_EQ(flight.blamed, 0U);
   for (std::size_t i = 0; i < kN; ++i) {
     EXPECT_EQ(flight.reason(i), Reason::kConfounded);
-    EXPECT_EQ(flight.monitor.rotors()[i].confounded_with, 0b1111U & ~(1U << i));
+    EXPECT_EQ(flight.rotor(i).confounded_with, 0b1111U & ~(1U << i));
   }
   // One of those that turn its way.
   EXPECT_TRUE(flight.is_ambiguous);
@@ -242,7 +139,7 @@ TEST(RotorUnbalanceMonitor, OfARotorThatWasNeverReadNoIntervalIsGiven) {
   flight.fly(20.0);
   for (std::size_t i = 0; i < kN; ++i) {
     ASSERT_EQ(flight.reason(i), Reason::kConfounded);
-    const RotorUnbalance& rotor = flight.monitor.rotors()[i];
+    const RotorUnbalance& rotor = flight.rotor(i);
     EXPECT_TRUE(std::isnan(rotor.reading.low_kg_m));
     EXPECT_TRUE(std::isnan(rotor.reading.high_kg_m));
     // What is read is what is felt at the moment, with all the doubt of it.
@@ -254,13 +151,13 @@ TEST(RotorUnbalanceMonitor, OfARotorThatWasNeverReadNoIntervalIsGiven) {
 
 TEST(RotorUnbalanceMonitor, OfARotorThatIsJudgedNoMoreNoIntervalIsGiven) {
   Flight flight;
-  EXPECT_TRUE(std::isnan(flight.monitor.rotors()[1].reading.low_kg_m));
+  EXPECT_TRUE(std::isnan(flight.rotor(1).reading.low_kg_m));
   flight.fly(5.0);
-  EXPECT_FALSE(std::isnan(flight.monitor.rotors()[1].reading.low_kg_m));
+  EXPECT_FALSE(std::isnan(flight.rotor(1).reading.low_kg_m));
   flight.monitor.on_phase(Phase::kOnGround);
   flight.fly(1.0);
-  EXPECT_TRUE(std::isnan(flight.monitor.rotors()[1].reading.low_kg_m));
-  EXPECT_TRUE(std::isnan(flight.monitor.rotors()[1].reading.high_kg_m));
+  EXPECT_TRUE(std::isnan(flight.rotor(1).reading.low_kg_m));
+  EXPECT_TRUE(std::isnan(flight.rotor(1).reading.high_kg_m));
 }
 
 TEST(RotorUnbalanceMonitor, InAStillHoverBaselinesThatHappenToPointOneWayAreNoUnbalance) {
@@ -283,7 +180,7 @@ TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
   Flight flight{params};
   flight.damage[1] = 2.0;
   flight.fly(20.0);
-  const UnbalanceReading& reading = flight.monitor.rotors()[1].reading;
+  const UnbalanceReading& reading = flight.rotor(1).reading;
   // Felt 2 m/s² where the accelerometer is.
   const double truth = 2.0 * UnbalanceMonitor::kg_m_per_m_s2(params, 1);
   EXPECT_NE(truth, 2.0 * UnbalanceMonitor::kg_m_per_m_s2(params));
@@ -296,7 +193,7 @@ TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
   Flight mended{params};
   mended.natural[3] = 0.0;
   mended.fly(20.0);
-  const UnbalanceReading& less = mended.monitor.rotors()[3].reading;
+  const UnbalanceReading& less = mended.rotor(3).reading;
   EXPECT_LT(less.growth_kg_m, 0.0);
   EXPECT_LT(less.low_kg_m, less.growth_kg_m);
   EXPECT_GT(less.high_kg_m, less.growth_kg_m);
@@ -305,9 +202,9 @@ TEST(RotorUnbalanceMonitor, ReadsAMassAndSaysHowSureItIs) {
   Flight measured{params};
   measured.damage[1] = 2.0;
   measured.fly(20.0);
-  EXPECT_LT(measured.monitor.rotors()[1].reading.sigma_kg_m, 0.1 * truth);
-  EXPECT_LT(measured.monitor.rotors()[1].reading.low_kg_m, truth);
-  EXPECT_GT(measured.monitor.rotors()[1].reading.high_kg_m, truth);
+  EXPECT_LT(measured.rotor(1).reading.sigma_kg_m, 0.1 * truth);
+  EXPECT_LT(measured.rotor(1).reading.low_kg_m, truth);
+  EXPECT_GT(measured.rotor(1).reading.high_kg_m, truth);
 }
 
 TEST(RotorUnbalanceMonitor, AResponseThatMayBeNextToNothingLeavesTheMassOpen) {
@@ -316,7 +213,7 @@ TEST(RotorUnbalanceMonitor, AResponseThatMayBeNextToNothingLeavesTheMassOpen) {
   Flight flight{params};
   flight.damage[1] = 2.0;
   flight.fly(20.0);
-  const UnbalanceReading& reading = flight.monitor.rotors()[1].reading;
+  const UnbalanceReading& reading = flight.rotor(1).reading;
   EXPECT_EQ(reading.high_kg_m, std::numeric_limits<double>::infinity());
   EXPECT_GT(reading.sigma_kg_m, 0.6 * reading.growth_kg_m);
   EXPECT_GT(reading.low_kg_m, 0.0);
@@ -325,7 +222,7 @@ TEST(RotorUnbalanceMonitor, AResponseThatMayBeNextToNothingLeavesTheMassOpen) {
   Flight mended{params};
   mended.natural[3] = 0.0;
   mended.fly(20.0);
-  EXPECT_EQ(mended.monitor.rotors()[3].reading.low_kg_m, -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(mended.rotor(3).reading.low_kg_m, -std::numeric_limits<double>::infinity());
 }
 
 TEST(RotorUnbalanceMonitor, WhatWasFoundStaysFoundInAStillHover) {
@@ -454,8 +351,8 @@ TEST(RotorUnbalanceMonitor, RefusesSpeedsOfAnotherNumberOfRotors) {
   monitor.on_phase(Phase::kInFlight);
   const std::array<double, 6> six{470.0, 471.0, 472.0, 473.0, 474.0, 475.0};
   for (int k = 0; k < 1000; ++k) {
-    monitor.on_speeds(at(0.002 * k), six);
-    (void)monitor.on_accel(at(0.002 * k), 1.0, 0.0, 0.0);
+    monitor.on_speeds(Flight::at(0.002 * k), six);
+    (void)monitor.on_accel(Flight::at(0.002 * k), 1.0, 0.0, 0.0);
   }
   EXPECT_EQ(monitor.rotors()[0].reason, Reason::kSpeedUnknown);
 }
@@ -464,13 +361,13 @@ TEST(RotorUnbalanceMonitor, NotANumberBlamesNobodyAndIsCounted) {
   Flight flight;
   flight.fly(5.0);
   for (int k = 0; k < 100; ++k) {
-    (void)flight.monitor.on_accel(at(flight.time_s), kNaN, 0.0, 0.0);
-    (void)flight.monitor.on_accel(at(flight.time_s), 0.0, HUGE_VAL, 0.0);
+    (void)flight.monitor.on_accel(Flight::at(flight.time_s), kNaN, 0.0, 0.0);
+    (void)flight.monitor.on_accel(Flight::at(flight.time_s), 0.0, HUGE_VAL, 0.0);
     flight.fly(0.002);
   }
   EXPECT_EQ(flight.blamed, 0U);
   EXPECT_EQ(flight.monitor.innovation().samples_refused, 200);
-  EXPECT_TRUE(std::isfinite(flight.monitor.rotors()[0].amplitude_m_s2));
+  EXPECT_TRUE(std::isfinite(flight.rotor(0).amplitude_m_s2));
 }
 
 TEST(RotorUnbalanceMonitor, AClockThatJumpsForwardBlamesNobody) {

@@ -9,28 +9,14 @@
 
 #include "tests/support/allocation_guard.h"
 #include "tests/support/reference/dense_effectiveness_filter.h"
+#include "tests/support/rotor_ring.h"
 
 namespace airworthy {
 namespace {
 
-constexpr double kStep_s = 0.002;
+using test::bebop_ring;
 
-/// Rotors on a circle, one after the other the other way round, like a Bebop 2 in size.
-Multirotor ring(std::size_t rotors) {
-  Multirotor vehicle;
-  vehicle.mass_kg = 0.5;
-  vehicle.inertia_kg_m2 = {0.0023, 0.0018, 0.0036};
-  vehicle.thrust_coefficient_N_s2 = 8e-6 / static_cast<double>(rotors);
-  vehicle.torque_ratio_m = 0.012;
-  vehicle.rotor_count = rotors;
-  for (std::size_t i = 0; i < rotors; ++i) {
-    const double angle =
-        2.0 * 3.14159265358979 * (static_cast<double>(i) + 0.5) / static_cast<double>(rotors);
-    vehicle.rotor[i].position_m = {0.14 * std::cos(angle), 0.14 * std::sin(angle), -0.01};
-    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-  }
-  return vehicle;
-}
+constexpr double kStep_s = 0.002;
 
 LossOfEffectivenessParams<double> general() {
   LossOfEffectivenessParams<double> params;
@@ -73,7 +59,7 @@ class Flight {
 };
 
 TEST(EffectivenessMatrix, OfAQuadByHand) {
-  Multirotor quad = ring(4);
+  Multirotor quad = bebop_ring(4);
   quad.rotor[0].position_m = {0.1, 0.2, 0.0};
   const auto matrix = EffectivenessMatrix<double>::of(quad);
   // Thrust upwards on the right rolls to the left, in front it pitches up; clockwise rotors turn the body left.
@@ -103,7 +89,7 @@ TEST(LossOfEffectivenessFilter, OneRotorReachesTheClosedFormVariance) {
 
 TEST(LossOfEffectivenessFilter, EqualsTheDenseTextbookFilter) {
   for (const std::size_t rotors : {3U, 4U, 6U, 8U}) {
-    const auto matrix = EffectivenessMatrix<double>::of(ring(rotors));
+    const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(rotors));
     const auto params = general();
     LossOfEffectivenessFilter<double> filter{matrix, params};
     const auto n = static_cast<Eigen::Index>(rotors);
@@ -154,7 +140,7 @@ TEST(LossOfEffectivenessFilter, ProbabilityIsTheNormalDistribution) {
 
 TEST(LossOfEffectivenessFilter, WithoutPullWhatFourRotorsHideGrowsWithoutBound) {
   auto params = LossOfEffectivenessParams<double>{};
-  const auto matrix = EffectivenessMatrix<double>::of(ring(4));
+  const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(4));
   const auto hidden_variance = [&](double pull, int steps) {
     params.pull_ratio = pull;
     LossOfEffectivenessFilter<double> filter{matrix, params};
@@ -173,7 +159,7 @@ TEST(LossOfEffectivenessFilter, WithoutPullWhatFourRotorsHideGrowsWithoutBound) 
 
 TEST(LossOfEffectivenessFilter, NamesEachLostRotorOfAnyVehicle) {
   for (std::size_t rotors = 3; rotors <= kMaxRotors; ++rotors) {
-    const auto matrix = EffectivenessMatrix<double>::of(ring(rotors));
+    const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(rotors));
     for (std::size_t lost = 0; lost < rotors; ++lost) {
       LossOfEffectivenessFilter<double> filter{matrix, general()};
       Flight flight{matrix, 7};
@@ -195,7 +181,7 @@ TEST(LossOfEffectivenessFilter, NamesEachLostRotorOfAnyVehicle) {
 }
 
 TEST(LossOfEffectivenessFilter, NamesNobodyForWhatOneRotorDoesNotExplain) {
-  const auto matrix = EffectivenessMatrix<double>::of(ring(6));
+  const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(6));
   LossOfEffectivenessFilter<double> filter{matrix, general()};
   Flight flight{matrix, 5};
   // Two rotors two arms apart: none alone has both moments.
@@ -218,7 +204,7 @@ TEST(LossOfEffectivenessFilter, NamesNobodyForWhatOneRotorDoesNotExplain) {
 
 TEST(LossOfEffectivenessFilter, ReadsWhatIsLeftOfOneRotor) {
   for (const double left : {0.4, 0.7, 1.3}) {
-    const auto matrix = EffectivenessMatrix<double>::of(ring(6));
+    const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(6));
     LossOfEffectivenessFilter<double> filter{matrix, general()};
     Flight flight{matrix, 3};
     const std::vector<double> k{1.0, 1.0, left, 1.0, 1.0, 1.0};
@@ -231,7 +217,7 @@ TEST(LossOfEffectivenessFilter, ReadsWhatIsLeftOfOneRotor) {
 TEST(LossOfEffectivenessFilter, MeasuresAFaultFromWhatTheFlightShowedBefore) {
   // The vehicle file promises a quarter more than the rotors give: a rotor that gives 0.2 of its own is not below 0.25 of
   // what the file says by much, and one that gives all of its own is not whole.
-  const auto matrix = EffectivenessMatrix<double>::of(ring(6));
+  const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(6));
   LossOfEffectivenessFilter<double> filter{matrix, general()};
   LossOfEffectivenessFilter<double> without{matrix, general()};
   Flight flight{matrix, 3};
@@ -290,7 +276,7 @@ TEST(LossOfEffectivenessFilter, TheReferenceIsAMeanThatForgetsAndHasALeast) {
 
 TEST(LossOfEffectivenessFilter, RenumberingTheRotorsRenumbersTheAnswer) {
   const std::array<std::size_t, 6> order{3, 0, 5, 1, 4, 2};
-  const Multirotor vehicle = ring(6);
+  const Multirotor vehicle = bebop_ring(6);
   Multirotor renumbered = vehicle;
   for (std::size_t i = 0; i < 6; ++i) renumbered.rotor[i] = vehicle.rotor[order[i]];
   LossOfEffectivenessFilter<double> a{EffectivenessMatrix<double>::of(vehicle), general()};
@@ -313,7 +299,7 @@ TEST(LossOfEffectivenessFilter, RenumberingTheRotorsRenumbersTheAnswer) {
 }
 
 TEST(LossOfEffectivenessFilter, RefusesWhatIsNoNumberAndKeepsItsState) {
-  const auto matrix = EffectivenessMatrix<double>::of(ring(4));
+  const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(4));
   LossOfEffectivenessFilter<double> filter{matrix, {}};
   std::array speed{640.0, 640.0, 640.0, 640.0};
   EXPECT_EQ(filter.update(0.0, speed, {}, -9.8), UpdateStatus::kConverging);
@@ -334,8 +320,8 @@ TEST(LossOfEffectivenessFilter, RefusesWhatIsNoNumberAndKeepsItsState) {
 }
 
 TEST(LossOfEffectivenessFilter, FloatFollowsDouble) {
-  const auto matrix = EffectivenessMatrix<double>::of(ring(8));
-  const auto matrix_f = EffectivenessMatrix<float>::of(ring(8));
+  const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(8));
+  const auto matrix_f = EffectivenessMatrix<float>::of(bebop_ring(8));
   LossOfEffectivenessParams<float> params_f;
   params_f.measurement_variance[kYawRow] = 4.0F;
   params_f.pull_ratio = 0.005F;
@@ -360,7 +346,7 @@ TEST(LossOfEffectivenessFilter, FloatFollowsDouble) {
 }
 
 TEST(LossOfEffectivenessFilter, UsesNoHeap) {
-  const auto matrix = EffectivenessMatrix<double>::of(ring(8));
+  const auto matrix = EffectivenessMatrix<double>::of(bebop_ring(8));
   const std::array speed{640.0, 640.0, 640.0, 640.0, 640.0, 640.0, 640.0, 640.0};
   const test::AllocationGuard guard;
   LossOfEffectivenessFilter<double> filter{matrix, general()};

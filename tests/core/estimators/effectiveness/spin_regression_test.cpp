@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "tests/support/allocation_guard.h"
+#include "tests/support/rotor_ring.h"
 
 namespace airworthy {
 namespace {
@@ -20,12 +20,7 @@ Multirotor ring(std::size_t rotors) {
   vehicle.thrust_coefficient_N_s2 = 7.6e-6;
   vehicle.torque_ratio_m = 0.0135;
   vehicle.propeller_inertia_kg_m2 = 1.5e-5;
-  vehicle.rotor_count = rotors;
-  for (std::size_t i = 0; i < rotors; ++i) {
-    const double angle = 2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(rotors);
-    vehicle.rotor[i].position_m = {0.15 * std::cos(angle), 0.15 * std::sin(angle), 0.0};
-    vehicle.rotor[i].spin = i % 2 == 0 ? 1 : -1;
-  }
+  test::put_on_ring(vehicle, rotors, 0.15);
   return vehicle;
 }
 

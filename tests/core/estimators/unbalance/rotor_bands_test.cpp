@@ -8,14 +8,15 @@
 #include <random>
 
 #include "core/estimators/unbalance/signal_power_ekf.h"
-#include "tests/support/allocation_guard.h"
 #include "tests/support/reference/dense_rotor_bands.h"
+#include "tests/support/signal_power_checks.h"
 #include "tests/support/unbalance_flight.h"
 
 namespace airworthy {
 namespace {
 
 using test::DenseRotorBands;
+using test::fly;
 using test::kHexa;
 using test::kMedium;
 using test::kSmall;
@@ -28,11 +29,8 @@ using InBands = SignalPowerEkf<Scalar, N, RotorBands<Scalar, N>>;
 // As ModelFlight has them: the first turns clockwise, the next the other way.
 int spin_of(std::size_t rotor) { return rotor % 2 == 0 ? 1 : -1; }
 
-SignalPowerParams params_of(const PaperVehicle& vehicle) {
-  SignalPowerParams params;
-  params.mass_kg = vehicle.mass_kg;
-  params.propeller_radius_m = vehicle.radius_m;
-  params.initial_tip_mass_mg = vehicle.initial_tip_mass_mg;
+SignalPowerParams in_bands(const PaperVehicle& vehicle) {
+  SignalPowerParams params = test::params_of(vehicle);
   params.expect_nothing();
   for (std::size_t i = 0; i < vehicle.rotors; ++i) params.bands.spin[i] = spin_of(i);
   return params;
@@ -42,25 +40,11 @@ SignalPowerParams params_of(const PaperVehicle& vehicle) {
 constexpr ModelFlight<4>::Options kCalm{.force_ratio = 0.1, .correlation_s = 0.5, .noise_m_s2 = 0.5};
 constexpr ModelFlight<6>::Options kCalmHexa{.force_ratio = 0.1, .correlation_s = 0.5, .noise_m_s2 = 0.5};
 
-template <class Scalar, std::size_t N>
-typename InBands<Scalar, N>::Sample sample_of(const ModelFlight<N>& flight, double speed_factor = 1.0) {
-  typename InBands<Scalar, N>::Sample sample;
-  sample.time = from_us(std::llround(flight.time_s * 1e6));
-  sample.ax_m_s2 = static_cast<Scalar>(flight.ax_m_s2);
-  sample.ay_m_s2 = static_cast<Scalar>(flight.ay_m_s2);
-  for (std::size_t i = 0; i < N; ++i)
-    sample.speed_rad_s[i] = static_cast<Scalar>(speed_factor * flight.speed_rad_s[i]);
-  return sample;
-}
-
-template <class Scalar, std::size_t N>
-void fly(InBands<Scalar, N>& ekf, ModelFlight<N>& flight, double duration_s, double speed_factor = 1.0) {
-  typename InBands<Scalar, N>::Innovation innovation;
-  const double until_s = flight.time_s + duration_s;
-  while (flight.time_s < until_s) {
-    flight.step();
-    static_cast<void>(ekf.update(sample_of<Scalar>(flight, speed_factor), innovation));
-  }
+/// Makes the speeds of a sample wrong by a common factor.
+auto scaled(double factor) {
+  return [factor](auto& sample) {
+    for (auto& speed : sample.speed_rad_s) speed *= factor;
+  };
 }
 
 template <std::size_t N>
@@ -71,7 +55,7 @@ double read_mg(const InBands<double, N>& ekf, const PaperVehicle& vehicle, std::
 // (1) to (5) against what they say: mean power in each band of one rotor whose phase walks as in (2), at speeds that
 // cross, and of white noise.
 TEST(RotorBands, GainsAreMeanPowersOverRandomPhases) {
-  SignalPowerParams params = params_of(kMedium);
+  SignalPowerParams params = in_bands(kMedium);
   constexpr std::size_t kSource = 1;
   constexpr int kDraws = 4000;
   constexpr int kSteps = 400;
@@ -118,7 +102,7 @@ TEST(RotorBands, GainsAreMeanPowersOverRandomPhases) {
 template <std::size_t N>
 void compare_with_dense(const PaperVehicle& vehicle, const std::array<double, N>& tip_mass_mg,
                         const typename ModelFlight<N>::Options& options, double speed_factor) {
-  SignalPowerParams params = params_of(vehicle);
+  SignalPowerParams params = in_bands(vehicle);
   params.innovation_limit_sigma = std::numeric_limits<double>::infinity();
   InBands<double, N> ekf{params};
   DenseRotorBands::Params dense_params;
@@ -130,7 +114,8 @@ void compare_with_dense(const PaperVehicle& vehicle, const std::array<double, N>
   double worst = 0.0;
   while (flight.time_s < 60.0) {
     flight.step();
-    auto sample = sample_of<double>(flight, speed_factor);
+    auto sample = test::sample_of<InBands<double, N>>(flight);
+    scaled(speed_factor)(sample);
     dense.update(to_seconds(sample.time - TimePoint{}), sample.ax_m_s2, sample.ay_m_s2,
                  Eigen::Map<const Eigen::VectorXd>(sample.speed_rad_s.data(), N));
     if (ekf.update(sample, innovation) != UpdateStatus::kFused) continue;
@@ -164,12 +149,9 @@ template <std::size_t N>
 void expect_found(const PaperVehicle& vehicle, double damage_mg, double good_mg, double within_s,
                   double speed_factor, const typename ModelFlight<N>::Options& options) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    std::array<double, N> truth_mg{};
-    truth_mg.fill(good_mg);
-    truth_mg[1] = damage_mg;
-    InBands<double, N> ekf{params_of(vehicle)};
-    ModelFlight<N> flight{vehicle, truth_mg, seed, options};
-    fly(ekf, flight, within_s, speed_factor);
+    InBands<double, N> ekf{in_bands(vehicle)};
+    ModelFlight<N> flight{vehicle, test::one_damaged<N>(damage_mg, good_mg), seed, options};
+    fly(ekf, flight, within_s, scaled(speed_factor));
     // A line narrower than a band reads up to √2 high, and these few seconds have their own scatter.
     EXPECT_GT(read_mg(ekf, vehicle, 1), 0.8 * damage_mg) << "seed " << seed;
     EXPECT_LT(read_mg(ekf, vehicle, 1), 1.75 * damage_mg) << "seed " << seed;
@@ -195,28 +177,21 @@ TEST(RotorBands, FindTheDamageBeyondHalfTheRateOfSampling) {
 
 TEST(RotorBands, TakeWhatAllSpeedsShare) {
   for (const double factor : {0.97, 1.02}) {
-    InBands<double, 4> ekf{params_of(kMedium)};
+    InBands<double, 4> ekf{in_bands(kMedium)};
     ModelFlight<4> flight{kMedium, {20.0, 40.0, 10.0, 5.0}, 5, kCalm};
-    fly(ekf, flight, 40.0, factor);
+    fly(ekf, flight, 40.0, scaled(factor));
     EXPECT_NEAR(ekf.bank().speed_scale() * factor, 1.0, 0.004);
   }
 }
 
 TEST(RotorBands, RenumberedRotorsGiveRenumberedAnswers) {
   constexpr std::array<std::size_t, 6> kOrder{3, 0, 5, 1, 4, 2};
-  SignalPowerParams params = params_of(kHexa);
+  SignalPowerParams params = in_bands(kHexa);
   InBands<double, 6> ekf{params};
   for (std::size_t i = 0; i < 6; ++i) params.bands.spin[i] = spin_of(kOrder[i]);
   InBands<double, 6> renumbered{params};
   ModelFlight<6> flight{kHexa, {5.0, 40.0, 4.0, 3.0, 6.0, 5.0}, 31, kCalmHexa};
-  InBands<double, 6>::Innovation innovation;
-  while (flight.time_s < 30.0) {
-    flight.step();
-    const auto sample = sample_of<double>(flight);
-    auto other = sample;
-    for (std::size_t i = 0; i < 6; ++i) other.speed_rad_s[i] = sample.speed_rad_s[kOrder[i]];
-    ASSERT_EQ(ekf.update(sample, innovation), renumbered.update(other, innovation));
-  }
+  test::fly_renumbered(ekf, renumbered, flight, 30.0, kOrder);
   // Sums of rounded numbers depend on their order, hence not to the bit.
   const auto told = ekf.isolation();
   const auto other = renumbered.isolation();
@@ -227,8 +202,8 @@ TEST(RotorBands, RenumberedRotorsGiveRenumberedAnswers) {
 }
 
 TEST(RotorBands, FloatTracksDouble) {
-  InBands<double, 4> ekf{params_of(kSmall)};
-  InBands<float, 4> single{params_of(kSmall)};
+  InBands<double, 4> ekf{in_bands(kSmall)};
+  InBands<float, 4> single{in_bands(kSmall)};
   ModelFlight<4> flight{kSmall, {0.5, 0.3, 5.0, 0.8}, 41, kCalm};
   ModelFlight<4> same{kSmall, {0.5, 0.3, 5.0, 0.8}, 41, kCalm};
   fly(ekf, flight, 120.0);
@@ -244,62 +219,19 @@ TEST(RotorBands, FloatTracksDouble) {
   std::printf("float against double after 120 s: %.1e of the largest power\n", worst);
 }
 
-TEST(RotorBands, NeverTouchTheHeap) {
-  InBands<float, 8> ekf{params_of(kHexa)};
-  InBands<float, 8>::Sample sample;
-  InBands<float, 8>::Innovation innovation;
-  sample.speed_rad_s.fill(450.0F);
-  const test::AllocationGuard guard;
-  float power = 0.0F;
-  for (int k = 0; k < 1000; ++k) {
-    sample.time = from_us(std::int64_t{2000} * k);
-    sample.ax_m_s2 = static_cast<float>(k % 7);
-    static_cast<void>(ekf.update(sample, innovation));
-    power += ekf.isolation().power[0];
-  }
-  EXPECT_EQ(guard.allocations(), 0U);
-  EXPECT_TRUE(std::isfinite(power));
-}
+TEST(RotorBands, NeverTouchTheHeap) { test::expect_no_heap<InBands<float, 8>>(in_bands(kHexa)); }
 
 TEST(RotorBands, WhatIsNoNumberLeavesEverythingAsItWas) {
-  using Ekf = InBands<double, 4>;
-  Ekf ekf{params_of(kMedium)};
+  InBands<double, 4> ekf{in_bands(kMedium)};
   ModelFlight<4> flight{kMedium, {5.0, 3.0, 40.0, 8.0}, 51, kCalm};
   fly(ekf, flight, 5.0);
-  Ekf clean = ekf;
-  flight.step();
-  const Ekf::Sample good = sample_of<double>(flight);
-  Ekf::Innovation innovation;
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), 1e200}) {
-    Ekf::Sample sample = good;
-    sample.ax_m_s2 = bad;
-    EXPECT_EQ(ekf.update(sample, innovation), UpdateStatus::kNotFinite);
-    sample = good;
-    sample.speed_rad_s[2] = bad;
-    EXPECT_EQ(ekf.update(sample, innovation), UpdateStatus::kNotFinite);
-  }
-  EXPECT_EQ(ekf.update(good, innovation), UpdateStatus::kFused);
-  EXPECT_EQ(clean.update(good, innovation), UpdateStatus::kFused);
-  EXPECT_EQ(ekf.state(), clean.state());
-  EXPECT_EQ(ekf.covariance(), clean.covariance());
-  EXPECT_EQ(ekf.information(), clean.information());
+  test::expect_refuses_what_is_no_number(ekf, flight);
 }
 
 // However wrong its input, the answer stays a number.
 TEST(RotorBands, StayFiniteUnderAnyInput) {
-  std::mt19937_64 random{81};
-  std::uniform_real_distribution<float> exponent{-6.0F, 4.0F};
-  std::normal_distribution<float> normal;
-  InBands<float, 6> ekf{params_of(kHexa)};
-  InBands<float, 6>::Sample sample;
-  InBands<float, 6>::Innovation innovation;
-  for (int k = 0; k < 50'000; ++k) {
-    sample.time += from_seconds(k % 1000 == 0 ? 0.09 : 0.002);
-    sample.ax_m_s2 = normal(random) * std::pow(10.0F, exponent(random));
-    sample.ay_m_s2 = normal(random);
-    for (float& speed : sample.speed_rad_s) speed = std::pow(10.0F, exponent(random));
-    static_cast<void>(ekf.update(sample, innovation));
-  }
+  InBands<float, 6> ekf{in_bands(kHexa)};
+  test::feed_anything(ekf, 50'000);
   for (const float x : ekf.state()) EXPECT_TRUE(std::isfinite(x));
   for (const float power : ekf.isolation().power) EXPECT_TRUE(std::isfinite(power));
   EXPECT_TRUE(std::isfinite(ekf.bank().speed_scale()));
@@ -307,17 +239,12 @@ TEST(RotorBands, StayFiniteUnderAnyInput) {
 
 // Rotors of one sense that turn alike pass for each other, and the information says so; others do not.
 TEST(RotorBands, TellWhichRotorsAreConfounded) {
-  using Ekf = InBands<double, 4>;
-  Ekf ekf{params_of(kMedium)};
+  InBands<double, 4> ekf{in_bands(kMedium)};
   ModelFlight<4> flight{kMedium, {5.0, 5.0, 40.0, 5.0}, 102, kCalm};
-  Ekf::Innovation innovation;
-  while (flight.time_s < 30.0) {
-    flight.step();
-    auto sample = sample_of<double>(flight);
+  fly(ekf, flight, 30.0, [](auto& sample) {
     sample.speed_rad_s[2] = sample.speed_rad_s[0];
     sample.speed_rad_s[3] = sample.speed_rad_s[0];
-    static_cast<void>(ekf.update(sample, innovation));
-  }
+  });
   const auto told = ekf.isolation();
   EXPECT_LT(told.correlation[0][2], -0.999);
   EXPECT_LT(told.information[0] / told.alone[0], 1e-6);

@@ -8,27 +8,22 @@
 #include <random>
 #include <vector>
 
-#include "tests/support/allocation_guard.h"
 #include "tests/support/reference/dense_signal_power_ekf.h"
+#include "tests/support/signal_power_checks.h"
 #include "tests/support/unbalance_flight.h"
 
 namespace airworthy {
 namespace {
 
 using test::DenseSignalPowerEkf;
+using test::fly;
 using test::kHexa;
 using test::kMedium;
 using test::kSmall;
 using test::ModelFlight;
 using test::PaperVehicle;
-
-SignalPowerParams params_of(const PaperVehicle& vehicle) {
-  SignalPowerParams params;
-  params.mass_kg = vehicle.mass_kg;
-  params.propeller_radius_m = vehicle.radius_m;
-  params.initial_tip_mass_mg = vehicle.initial_tip_mass_mg;
-  return params;
-}
+using test::params_of;
+using test::sample_of;
 
 DenseSignalPowerEkf::Params dense_params_of(const PaperVehicle& vehicle) {
   DenseSignalPowerEkf::Params params;
@@ -40,38 +35,11 @@ DenseSignalPowerEkf::Params dense_params_of(const PaperVehicle& vehicle) {
   return params;
 }
 
-template <class Scalar, std::size_t N>
-typename SignalPowerEkf<Scalar, N>::Sample sample_of(const ModelFlight<N>& flight) {
-  typename SignalPowerEkf<Scalar, N>::Sample sample;
-  sample.time = from_us(std::llround(flight.time_s * 1e6));
-  sample.ax_m_s2 = static_cast<Scalar>(flight.ax_m_s2);
-  sample.ay_m_s2 = static_cast<Scalar>(flight.ay_m_s2);
-  for (std::size_t i = 0; i < N; ++i) sample.speed_rad_s[i] = static_cast<Scalar>(flight.speed_rad_s[i]);
-  return sample;
-}
-
 template <std::size_t N>
 void feed(DenseSignalPowerEkf& dense, const ModelFlight<N>& flight) {
   const Eigen::VectorXd speed = Eigen::Map<const Eigen::VectorXd>(flight.speed_rad_s.data(), N);
   dense.update(static_cast<double>(std::llround(flight.time_s * 1e6)) * 1e-6, flight.ax_m_s2, flight.ay_m_s2,
                speed);
-}
-
-/// Flies until `duration_s` and returns the mean NIS of the second half.
-template <class Scalar, std::size_t N>
-double fly(SignalPowerEkf<Scalar, N>& ekf, ModelFlight<N>& flight, double duration_s) {
-  double sum = 0.0;
-  int count = 0;
-  typename SignalPowerEkf<Scalar, N>::Innovation innovation;
-  const double begun_s = flight.time_s;
-  while (flight.time_s < begun_s + duration_s) {
-    flight.step();
-    if (ekf.update(sample_of<Scalar>(flight), innovation) != UpdateStatus::kFused) continue;
-    if (flight.time_s < begun_s + 0.5 * duration_s) continue;
-    sum += static_cast<double>(innovation.nis);
-    ++count;
-  }
-  return sum / count;
 }
 
 /// What the flat band expects at these speeds.
@@ -159,7 +127,7 @@ void compare_with_dense(const PaperVehicle& vehicle, const std::array<double, N>
   while (flight.time_s < duration_s) {
     flight.step();
     feed(dense, flight);
-    const UpdateStatus status = ekf.update(sample_of<double>(flight), innovation);
+    const UpdateStatus status = ekf.update(test::sample_of<SignalPowerEkf<double, N>>(flight), innovation);
     if (status != UpdateStatus::kFused) continue;
     for (std::size_t i = 0; i < N; ++i) {
       const double expected = dense.tip_mass_mg(static_cast<Eigen::Index>(i));
@@ -188,14 +156,7 @@ TEST(SignalPowerEkf, RenumberedRotorsGiveRenumberedAnswers) {
   SignalPowerEkf<double, 6> ekf{params_of(kHexa)};
   SignalPowerEkf<double, 6> renumbered{params_of(kHexa)};
   ModelFlight<6> flight{kHexa, {5.0, 40.0, 4.0, 3.0, 6.0, 5.0}, 31};
-  SignalPowerEkf<double, 6>::Innovation innovation;
-  while (flight.time_s < 60.0) {
-    flight.step();
-    const auto sample = sample_of<double>(flight);
-    auto other = sample;
-    for (std::size_t i = 0; i < 6; ++i) other.speed_rad_s[i] = sample.speed_rad_s[kOrder[i]];
-    ASSERT_EQ(ekf.update(sample, innovation), renumbered.update(other, innovation));
-  }
+  test::fly_renumbered(ekf, renumbered, flight, 60.0, kOrder);
   // Sums of rounded numbers depend on their order, hence not to the bit.
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_NEAR(renumbered.tip_mass_mg(i), ekf.tip_mass_mg(kOrder[i]), 1e-11 * ekf.tip_mass_mg(kOrder[i]));
@@ -226,58 +187,14 @@ TEST(SignalPowerEkf, FloatTracksDouble) {
 }
 
 TEST(SignalPowerEkf, NeverTouchesTheHeap) {
-  SignalPowerEkf<float, 8> ekf{params_of(kHexa)};
-  SignalPowerEkf<float, 8>::Sample sample;
-  SignalPowerEkf<float, 8>::Innovation innovation;
-  sample.speed_rad_s.fill(450.0F);
-  const test::AllocationGuard guard;
-  float information = 0.0F;
-  for (int k = 0; k < 1000; ++k) {
-    sample.time = from_us(std::int64_t{2000} * k);
-    sample.ax_m_s2 = static_cast<float>(k % 7);
-    static_cast<void>(ekf.update(sample, innovation));
-    information += ekf.isolation().information[0];
-  }
-  EXPECT_EQ(guard.allocations(), 0U);
-  EXPECT_TRUE(std::isfinite(information));
-}
-
-template <class Ekf>
-void expect_unchanged(const Ekf& ekf, const Ekf& before) {
-  EXPECT_EQ(ekf.state(), before.state());
-  EXPECT_EQ(ekf.covariance(), before.covariance());
-  EXPECT_EQ(ekf.information(), before.information());
-  EXPECT_EQ(ekf.fused(), before.fused());
+  test::expect_no_heap<SignalPowerEkf<float, 8>>(params_of(kHexa));
 }
 
 TEST(SignalPowerEkf, WhatIsNoNumberLeavesEverythingAsItWas) {
-  using Ekf = SignalPowerEkf<double, 4>;
-  Ekf ekf{params_of(kMedium)};
+  SignalPowerEkf<double, 4> ekf{params_of(kMedium)};
   ModelFlight<4> flight{kMedium, {5.0, 3.0, 40.0, 8.0}, 51};
   fly(ekf, flight, 5.0);
-  Ekf clean = ekf;
-  const Ekf before = ekf;
-  flight.step();
-  const Ekf::Sample good = sample_of<double>(flight);
-  Ekf::Innovation innovation;
-  std::int64_t refused = 0;
-  for (const double bad :
-       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e200}) {
-    for (int field = 0; field < 4; ++field) {
-      Ekf::Sample sample = good;
-      if (field == 0) sample.ax_m_s2 = bad;
-      if (field == 1) sample.ay_m_s2 = bad;
-      if (field == 2) sample.speed_rad_s[0] = bad;
-      if (field == 3) sample.speed_rad_s[3] = bad;
-      EXPECT_EQ(ekf.update(sample, innovation), UpdateStatus::kNotFinite);
-      expect_unchanged(ekf, before);
-      EXPECT_EQ(ekf.refused(), ++refused);
-    }
-  }
-  // Neither have they left a trace in the high-pass or the time.
-  EXPECT_EQ(ekf.update(good, innovation), UpdateStatus::kFused);
-  EXPECT_EQ(clean.update(good, innovation), UpdateStatus::kFused);
-  expect_unchanged(ekf, clean);
+  test::expect_refuses_what_is_no_number(ekf, flight);
 }
 
 TEST(SignalPowerEkf, TimeMustGoForwardAndAGapStartsTheHighPassAfresh) {
@@ -287,11 +204,11 @@ TEST(SignalPowerEkf, TimeMustGoForwardAndAGapStartsTheHighPassAfresh) {
   fly(ekf, flight, 5.0);
   const Ekf before = ekf;
   Ekf::Innovation innovation;
-  Ekf::Sample sample = sample_of<double>(flight);
+  Ekf::Sample sample = sample_of<Ekf>(flight);
   EXPECT_EQ(ekf.update(sample, innovation), UpdateStatus::kTimeBackward);  // the same again
   sample.time -= from_seconds(1.0);
   EXPECT_EQ(ekf.update(sample, innovation), UpdateStatus::kTimeBackward);
-  expect_unchanged(ekf, before);
+  test::expect_unchanged(ekf, before);
 
   // An hour later: no less sure of anything than the bound allows, and a new offset of the sensor is no vibration.
   sample.time += from_seconds(3600.0);
@@ -319,7 +236,7 @@ TEST(SignalPowerEkf, AKnockIsLimitedAndCounted) {
   fly(ekf, flight, 20.0);
   const Ekf before = ekf;
   flight.step();
-  Ekf::Sample sample = sample_of<double>(flight);
+  Ekf::Sample sample = sample_of<Ekf>(flight);
   sample.ax_m_s2 += 150.0;  // full range
   Ekf::Innovation innovation;
   ASSERT_EQ(ekf.update(sample, innovation), UpdateStatus::kFused);
@@ -330,19 +247,8 @@ TEST(SignalPowerEkf, AKnockIsLimitedAndCounted) {
 
 // However wrong its input, the answer stays a number and P positive definite.
 TEST(SignalPowerEkf, StaysPositiveDefiniteUnderAnyInput) {
-  std::mt19937_64 random{81};
-  std::uniform_real_distribution<float> exponent{-6.0F, 4.0F};
-  std::normal_distribution<float> normal;
   SignalPowerEkf<float, 6> ekf{params_of(kHexa)};
-  SignalPowerEkf<float, 6>::Sample sample;
-  SignalPowerEkf<float, 6>::Innovation innovation;
-  for (int k = 0; k < 200'000; ++k) {
-    sample.time += from_seconds(k % 1000 == 0 ? 0.09 : 0.002);
-    sample.ax_m_s2 = normal(random) * std::pow(10.0F, exponent(random));
-    sample.ay_m_s2 = normal(random);
-    for (float& speed : sample.speed_rad_s) speed = std::pow(10.0F, exponent(random));
-    static_cast<void>(ekf.update(sample, innovation));
-  }
+  test::feed_anything(ekf, 200'000);
   Eigen::MatrixXd p(7, 7);
   for (Eigen::Index i = 0; i < 7; ++i) {
     for (Eigen::Index j = 0; j < 7; ++j) {
@@ -360,11 +266,8 @@ template <std::size_t N>
 void expect_paper_experiment(const char* name, const PaperVehicle& vehicle, double damage_mg, double good_mg,
                              double within_s) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    std::array<double, N> truth_mg{};
-    truth_mg.fill(good_mg);
-    truth_mg[1] = damage_mg;
     SignalPowerEkf<double, N> ekf{params_of(vehicle)};
-    ModelFlight<N> flight{vehicle, truth_mg, seed};
+    ModelFlight<N> flight{vehicle, test::one_damaged<N>(damage_mg, good_mg), seed};
     const double nis = fly(ekf, flight, within_s);
     std::printf("%s, seed %u, after %.0f s:", name, seed, within_s);
     for (std::size_t i = 0; i < N; ++i) std::printf(" %.2f", ekf.tip_mass_mg(i));
@@ -429,16 +332,9 @@ TEST(SignalPowerEkf, ForcesInUnisonIsolateNothing) {
 
 // Two of four rotors alike: these two stand for each other, and no other.
 TEST(SignalPowerEkf, TellsWhichRotorsAreConfounded) {
-  using Ekf = SignalPowerEkf<double, 4>;
-  Ekf ekf{params_of(kMedium)};
+  SignalPowerEkf<double, 4> ekf{params_of(kMedium)};
   ModelFlight<4> flight{kMedium, {5.0, 5.0, 40.0, 5.0}, 102};
-  Ekf::Innovation innovation;
-  while (flight.time_s < 60.0) {
-    flight.step();
-    auto sample = sample_of<double>(flight);
-    sample.speed_rad_s[3] = sample.speed_rad_s[0];
-    static_cast<void>(ekf.update(sample, innovation));
-  }
+  fly(ekf, flight, 60.0, [](auto& sample) { sample.speed_rad_s[3] = sample.speed_rad_s[0]; });
   const auto isolation = ekf.isolation();
   EXPECT_LT(isolation.correlation[0][3], -0.999);
   EXPECT_GT(isolation.correlation[0][1], -0.9);
@@ -457,7 +353,7 @@ TEST(SignalPowerEkf, InformationIsThatOfWeightedLeastSquares) {
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(5, 5);
   while (flight.time_s < 20.0) {
     flight.step();
-    if (ekf.update(sample_of<double>(flight), innovation) != UpdateStatus::kFused) continue;
+    if (ekf.update(sample_of<Ekf>(flight), innovation) != UpdateStatus::kFused) continue;
     Eigen::VectorXd row(5);
     for (Eigen::Index i = 0; i < 4; ++i) {
       const double speed = flight.speed_rad_s[static_cast<std::size_t>(i)];
@@ -486,7 +382,7 @@ TEST(SignalPowerEkf, PowersAreThoseOfWeightedLeastSquares) {
   Ekf::Innovation innovation;
   while (flight.time_s < 20.0) {
     flight.step();
-    if (ekf.update(sample_of<double>(flight), innovation) != UpdateStatus::kFused) continue;
+    if (ekf.update(sample_of<Ekf>(flight), innovation) != UpdateStatus::kFused) continue;
     const double weight = 1.0 / std::sqrt(innovation.measurement_variance_m4_s8);
     for (const double speed : flight.speed_rad_s) {
       values.push_back(weight * std::pow(20e-6 * kMedium.radius_m * speed * speed / kMedium.mass_kg, 2));
