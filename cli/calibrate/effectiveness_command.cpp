@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/calibrate/effectiveness_learning.h"
-#include "cli/calibrate/write_file.h"
+#include "runtime/file/output_file.h"
 #include "runtime/process/exit.h"
 
 namespace airworthy::calibrate {
@@ -82,11 +82,14 @@ int calibrate_effectiveness(int argc, char** argv) {
   const auto config =
       effectiveness::EffectivenessConfig::load_uncalibrated(options.config_path, options.overrides);
   if (!config) return rt::fail(EX_CONFIG, config.error());
+  if (const auto checked = rt::check_output_path(options.output); !checked) {
+    return rt::fail(EX_CANTCREAT, checked.error());
+  }
   const auto flights = read_effectiveness_recordings(options.logs, *config, options.jobs);
   if (!flights) return rt::fail(EX_DATAERR, flights.error());
   const auto learned = learn_effectiveness(*flights, *config, options.keeps_unexcited);
   if (!learned) return rt::fail(EX_DATAERR, learned.error());
-  if (const auto written = write_file(options.output, effectiveness::to_toml(*learned)); !written) {
+  if (const auto written = rt::write_file(options.output, effectiveness::to_toml(*learned)); !written) {
     return rt::fail(EX_CANTCREAT, written.error());
   }
   print_summary(*learned);

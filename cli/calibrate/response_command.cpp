@@ -12,7 +12,7 @@
 #include "cli/calibrate/flight_name.h"
 #include "cli/calibrate/learning.h"
 #include "cli/calibrate/suggest_pairs.h"
-#include "cli/calibrate/write_file.h"
+#include "runtime/file/output_file.h"
 #include "runtime/process/exit.h"
 
 namespace airworthy::calibrate {
@@ -144,14 +144,16 @@ int calibrate_response(int argc, char** argv) {
   if (!config) return rt::fail(EX_CONFIG, config.error());
   if (options.suggest_pairs) return suggest(options, *config);
   if (options.vehicle.empty()) options.vehicle = config->vehicle;
-
+  if (const auto checked = rt::check_output_path(options.output); !checked) {
+    return rt::fail(EX_CANTCREAT, checked.error());
+  }
   const auto flights = read_flights(options, *config, *flight_name);
   if (!flights) return rt::fail(EX_DATAERR, flights.error());
   std::vector<const calibrate::HealthyFlight*> all;
   for (const auto& flight : *flights) all.push_back(&flight);
   const auto learned = calibrate::learn(all, *config, options.learning);
   if (!learned) return rt::fail(EX_DATAERR, learned.error());
-  if (const auto written = write_file(options.output, to_toml(learned->calibration)); !written) {
+  if (const auto written = rt::write_file(options.output, to_toml(learned->calibration)); !written) {
     return rt::fail(EX_CANTCREAT, written.error());
   }
   print_summary(*learned, config->channel_names());

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cli/calibrate/unbalance_learning.h"
-#include "cli/calibrate/write_file.h"
+#include "runtime/file/output_file.h"
 #include "runtime/process/exit.h"
 
 namespace airworthy::calibrate {
@@ -122,9 +122,12 @@ int calibrate_unbalance(int argc, char** argv) {
     if (!trial) return rt::fail(EX_USAGE, trial.error());
     trials.push_back(std::move(*trial));
   }
+  if (const auto checked = rt::check_output_path(options.output); !checked) {
+    return rt::fail(EX_CANTCREAT, checked.error());
+  }
   const auto learned = learn_unbalance(options.logs, trials, *config, options.jobs);
   if (!learned) return rt::fail(EX_DATAERR, learned.error());
-  if (const auto written = write_file(options.output, to_toml(learned->calibration)); !written) {
+  if (const auto written = rt::write_file(options.output, to_toml(learned->calibration)); !written) {
     return rt::fail(EX_CANTCREAT, written.error());
   }
   print_summary(*learned, config->monitor);
