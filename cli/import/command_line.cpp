@@ -21,9 +21,9 @@ constexpr rt::Range kMoment_s{0.0, 9e12};
 tl::expected<Request, int> parse_command_line(int argc, const char* const* argv) {
   CLI::App app{
       "Turns recorded flights of other kinds into LCM logs.\n"
-      "Exit code 0: done; 64: wrong arguments; 65: input that is not as it should be; 73: a log that cannot "
-      "be "
-      "written; 78: wrong configuration or map.",
+      "Exit code 0: done; 64: wrong arguments; 65: input that is not as it should be, or a disk that ran "
+      "full; 73: "
+      "a log that cannot be begun where it is to be; 78: wrong configuration or map.",
       "airworthy import"};
   app.set_version_flag("--version", AIRWORTHY_VERSION);
   app.require_subcommand(0, 1);
