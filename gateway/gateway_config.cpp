@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "gateway/feed/endpoint.h"
 #include "runtime/config/vehicle.h"
 
@@ -43,12 +47,22 @@ void check_process_name(ConfigTable table, const char* key, const std::string& n
   }
 }
 
+/// A process that is named twice was hardly meant twice.
+std::vector<std::string> read_processes(ConfigTable table, const char* key, rt::Count count) {
+  auto names = table.required<std::vector<std::string>>(key, {}, count);
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    check_process_name(table, key, *name);
+    if (std::find(names.begin(), name, *name) != name) {
+      table.fail(key, fmt::format("\"{}\" is named twice", *name));
+    }
+  }
+  return names;
+}
+
 health::HealthConfig read_health(ConfigTable table) {
   health::HealthConfig health;
-  health.expected_processes = table.required<std::vector<std::string>>(
-      "expected_processes", {}, rt::Count::at_most(health.limits.processes / 2));
-  for (const std::string& name : health.expected_processes)
-    check_process_name(table, "expected_processes", name);
+  health.expected_processes =
+      read_processes(table, "expected_processes", rt::Count::at_most(health.limits.processes / 2));
 
   // Below 0.3 s a life sign every 0.2 s could not be on time; above 60 s a deadline is none.
   health.process_deadline =
@@ -62,7 +76,7 @@ health::HealthConfig read_health(ConfigTable table) {
   for (ConfigTable& source : table.tables("source", {.unique_key = "process"})) {
     const auto process = source.required<std::string>("process");
     check_process_name(source, "process", process);
-    health.feeds[process] = source.required<std::vector<std::string>>("feeds");
+    health.feeds[process] = read_processes(source, "feeds", {});
   }
   return health;
 }

@@ -17,7 +17,7 @@ import tomllib
 import flight_rig
 
 DATA = pathlib.Path(os.environ.get("AIRWORTHY_DATA", flight_rig.PROJECT.parent / "shared/data"))
-VEHICLE = "vehicles/unbalance_hexa.toml"
+VEHICLE = "multirotor.toml"
 SCENARIO = "scenarios/demo.toml"
 HEALTHY = "scenarios/healthy_manoeuvres.toml"
 
@@ -98,8 +98,7 @@ def calibrated(rig, seed):
     files = {name: rig.path / f"{name}_calibration.toml" for name in ("unbalance", "effectiveness")}
     steps = [[rig.binaries / "airworthy-sim", "--vehicle", rig.config / VEHICLE, "--scenario", rig.config / HEALTHY,
               "--vehicle-seed", seed, "--seed", seed + 1000, "--output", log]]
-    steps += [[rig.binaries / "airworthy-calibrate", name, "--config", rig.config / f"{name}.toml", "--set",
-               f"vehicle={rig.config / VEHICLE}", "--output", file, log] for name, file in files.items()]
+    steps += [[rig.binaries / "airworthy-calibrate", name, "--config", rig.config / f"{name}.toml", "--output", file, log] for name, file in files.items()]
     for step in steps:
         done = subprocess.run([str(part) for part in step], capture_output=True, text=True)
         if done.returncode != 0:
@@ -112,12 +111,12 @@ def run(given):
         check_computer(given.binaries, rig.lcm_url)
         if given.flight is None:
             calibration = calibrated(rig, given.seed)
-            rig.start_gateway(config="demo/gateway.toml")
+            rig.start_gateway(config="gateway_multirotor.toml")
             for name, file in calibration.items():
-                rig.start_service(f"airworthy-{name}", f"{name}.toml", [f"vehicle={rig.config / VEHICLE}", f"calibration={file}"])
-            rig.start_service("airworthy-actuator", "actuator.toml", [f"vehicle={rig.config / VEHICLE}"])
-            rig.start_response([f"vehicle={rig.config / VEHICLE}"], config="response_multirotor.toml")
-            rig.start_driver(config="demo/mavlink.toml")
+                rig.start_service(f"airworthy-{name}", f"{name}.toml", [f"calibration={file}"])
+            rig.start_service("airworthy-actuator", "actuator.toml")
+            rig.start_response(config="response_multirotor.toml")
+            rig.start_driver(config="mavlink_multirotor.toml")
             feed = flight_rig.Feed(rig.endpoint)
             flight = rig.start_simulation(VEHICLE, SCENARIO, "--seed", given.seed)
         else:

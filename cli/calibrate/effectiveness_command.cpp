@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "cli/calibrate/effectiveness_learning.h"
-#include "cli/calibrate/write_file.h"
+#include "runtime/file/output_file.h"
+#include "runtime/process/command_line.h"
 #include "runtime/process/exit.h"
 
 namespace airworthy::calibrate {
@@ -60,6 +61,7 @@ int calibrate_effectiveness(int argc, char** argv) {
       "Learns from healthy flights how a vehicle answers to its rotors, and writes it to a file for "
       "airworthy-effectiveness (key `calibration`).",
       "airworthy calibrate effectiveness"};
+  app.set_version_flag("--version", "airworthy-calibrate " AIRWORTHY_VERSION);
   Options options;
   options.jobs = std::max(1U, std::thread::hardware_concurrency());
   app.add_option(
@@ -72,21 +74,20 @@ int calibrate_effectiveness(int argc, char** argv) {
   app.add_option("-o,--output", options.output, "calibration file to write")->required();
   app.add_flag("--keep-unexcited", options.keeps_unexcited,
                "an axis that the flights did not excite keeps the effectiveness of the vehicle file");
-  app.add_option("--jobs", options.jobs, "flights read at a time")->check(CLI::Range(1U, 256U));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+  app.add_option("--jobs", options.jobs, "flights read at a time")->check(rt::is_whole_number(1, 256));
+  if (const auto ended = rt::parse_command_line(app, argc, argv)) return *ended;
   // Learning starts from nothing, whatever the configuration names.
   const auto config =
       effectiveness::EffectivenessConfig::load_uncalibrated(options.config_path, options.overrides);
   if (!config) return rt::fail(EX_CONFIG, config.error());
+  if (const auto checked = rt::check_output_path(options.output); !checked) {
+    return rt::fail(EX_CANTCREAT, checked.error());
+  }
   const auto flights = read_effectiveness_recordings(options.logs, *config, options.jobs);
   if (!flights) return rt::fail(EX_DATAERR, flights.error());
   const auto learned = learn_effectiveness(*flights, *config, options.keeps_unexcited);
   if (!learned) return rt::fail(EX_DATAERR, learned.error());
-  if (const auto written = write_file(options.output, effectiveness::to_toml(*learned)); !written) {
+  if (const auto written = rt::write_file(options.output, effectiveness::to_toml(*learned)); !written) {
     return rt::fail(EX_CANTCREAT, written.error());
   }
   print_summary(*learned);

@@ -449,6 +449,17 @@ double smallest_loss(const EffectivenessParams& params, double threshold) {
   return std::sqrt(2.0 * threshold / least);
 }
 
+tl::unexpected<rt::Error> too_short(const std::vector<Recording>& flights, double used_s) {
+  double after_onset_s = 0.0;
+  for (const Recording& flight : flights) after_onset_s += flight.after_onset_s;
+  const std::string more =
+      after_onset_s > 0.0
+          ? fmt::format("; {:.1f} s more came after the onset of a fault in GROUND_TRUTH", after_onset_s)
+          : "";
+  return rt::fail_with(
+      fmt::format("only {:.1f} s of free flight, {:g} s are needed{}", used_s, kLeastFlight_s, more));
+}
+
 }  // namespace
 
 rt::Expected<Duration> inertial_delay_of(const EffectivenessRecording& flight,
@@ -510,10 +521,7 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& reco
                       flight.log));
     }
   }
-  if (calibration.used_s < kLeastFlight_s) {
-    return rt::fail_with(
-        fmt::format("only {:.1f} s of free flight, {:g} s are needed", calibration.used_s, kLeastFlight_s));
-  }
+  if (calibration.used_s < kLeastFlight_s) return too_short(flights, calibration.used_s);
   std::vector<Speeds> speeds;
   if (is_unheard) {
     const MotorFit motor = learn_unheard_motor(flights, params);
@@ -600,7 +608,9 @@ rt::Expected<std::vector<Recording>> read_effectiveness_recordings(const std::ve
     }
     if (flight->truth && flight->truth->onset) {
       const TimePoint until = *flight->truth->onset - kBeforeOnset;
+      const double whole_s = flown_s(recording);
       std::erase_if(recording.in_flight, [until](const auto& sample) { return sample.time >= until; });
+      recording.after_onset_s = whole_s - flown_s(recording);
     }
     return recording;
   };

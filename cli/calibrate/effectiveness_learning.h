@@ -24,6 +24,7 @@ struct EffectivenessRecording {
   };
   std::string log;
   std::vector<Inertial> in_flight;
+  double after_onset_s = 0.0;      ///< of free flight that was left out, for something was broken then
   std::vector<PerRotor> speeds;    ///< rad/s
   std::vector<PerRotor> commands;  ///< 0 to 1
 };

@@ -1,12 +1,16 @@
+#include <fmt/format.h>
 #include <sysexits.h>
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <string_view>
+#include <system_error>
 
 #include "cli/calibrate/effectiveness_command.h"
 #include "cli/calibrate/response_command.h"
 #include "cli/calibrate/unbalance_command.h"
+#include "runtime/process/command_line.h"
 
 namespace {
 
@@ -18,6 +22,12 @@ int run(int argc, char** argv) {
   if (what == "unbalance") return calibrate_unbalance(argc - 1, argv + 1);
   if (what == "effectiveness") return calibrate_effectiveness(argc - 1, argv + 1);
   if (what == "response") return calibrate_response(argc - 1, argv + 1);
+  std::error_code error;
+  const bool is_word = !what.empty() && what.find_first_of("-./") == std::string_view::npos;
+  if (is_word && !std::filesystem::exists(what, error)) {
+    return airworthy::rt::wrong_usage(
+        fmt::format("\"{}\" is neither response, unbalance or effectiveness nor a log", what));
+  }
   return calibrate_response(argc, argv);
 }
 

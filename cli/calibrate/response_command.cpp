@@ -12,7 +12,8 @@
 #include "cli/calibrate/flight_name.h"
 #include "cli/calibrate/learning.h"
 #include "cli/calibrate/suggest_pairs.h"
-#include "cli/calibrate/write_file.h"
+#include "runtime/file/output_file.h"
+#include "runtime/process/command_line.h"
 #include "runtime/process/exit.h"
 
 namespace airworthy::calibrate {
@@ -104,6 +105,12 @@ int calibrate_response(int argc, char** argv) {
       "Learns from healthy flights of a vehicle what its responses are, how much they vary and how far its "
       "detectors may trust that, and writes it to a file for airworthy-response (key `calibration`).",
       "airworthy calibrate"};
+  app.set_version_flag("--version", "airworthy-calibrate " AIRWORTHY_VERSION);
+  app.footer(
+      "This is `airworthy calibrate response`. For the other detectors there are\n"
+      "  airworthy calibrate unbalance       how well the propellers are balanced\n"
+      "  airworthy calibrate effectiveness   how the vehicle answers to its rotors\n"
+      "each with a --help of its own.");
   Options options;
   options.learning.jobs = std::max(1U, std::thread::hardware_concurrency());
   app.add_option(
@@ -127,15 +134,12 @@ int calibrate_response(int argc, char** argv) {
       "every log is a flight of its own");
   app.add_option("--false-alarms-per-hour", options.learning.false_alarms_per_hour,
                  "of each channel; default 0.01")
-      ->check(CLI::Range(1e-6, 10.0));
-  app.add_option("--jobs", options.learning.jobs, "flights read at a time")->check(CLI::Range(1U, 256U));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+      ->check(rt::is_number(rt::Range{1e-6, 10.0}));
+  app.add_option("--jobs", options.learning.jobs, "flights read at a time")
+      ->check(rt::is_whole_number(1, 256));
+  if (const auto ended = rt::parse_command_line(app, argc, argv)) return *ended;
   if (!options.suggest_pairs && options.output.empty()) {
-    return rt::fail(EX_USAGE, rt::Error{"airworthy-calibrate: --output FILE or --suggest-pairs is needed"});
+    return rt::wrong_usage("--output FILE or --suggest-pairs is needed");
   }
   const auto flight_name = calibrate::FlightName::parse(options.flight_name);
   if (!flight_name) return rt::fail(EX_USAGE, flight_name.error());
@@ -144,14 +148,16 @@ int calibrate_response(int argc, char** argv) {
   if (!config) return rt::fail(EX_CONFIG, config.error());
   if (options.suggest_pairs) return suggest(options, *config);
   if (options.vehicle.empty()) options.vehicle = config->vehicle;
-
+  if (const auto checked = rt::check_output_path(options.output); !checked) {
+    return rt::fail(EX_CANTCREAT, checked.error());
+  }
   const auto flights = read_flights(options, *config, *flight_name);
   if (!flights) return rt::fail(EX_DATAERR, flights.error());
   std::vector<const calibrate::HealthyFlight*> all;
   for (const auto& flight : *flights) all.push_back(&flight);
   const auto learned = calibrate::learn(all, *config, options.learning);
   if (!learned) return rt::fail(EX_DATAERR, learned.error());
-  if (const auto written = write_file(options.output, to_toml(learned->calibration)); !written) {
+  if (const auto written = rt::write_file(options.output, to_toml(learned->calibration)); !written) {
     return rt::fail(EX_CANTCREAT, written.error());
   }
   print_summary(*learned, config->channel_names());

@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "cli/calibrate/unbalance_learning.h"
-#include "cli/calibrate/write_file.h"
+#include "runtime/file/output_file.h"
+#include "runtime/process/command_line.h"
 #include "runtime/process/exit.h"
 
 namespace airworthy::calibrate {
@@ -92,6 +93,7 @@ int calibrate_unbalance(int argc, char** argv) {
       "file for "
       "airworthy-unbalance (key `calibration`).",
       "airworthy calibrate unbalance"};
+  app.set_version_flag("--version", "airworthy-calibrate " AIRWORTHY_VERSION);
   Options options;
   options.jobs = std::max(1U, std::thread::hardware_concurrency());
   app.add_option(
@@ -107,12 +109,8 @@ int calibrate_unbalance(int argc, char** argv) {
          "ROTOR:MILLIGRAM:LOG, a flight with a known mass stuck to the tip of one blade of that rotor; once "
          "for either blade. Measures what the inertial unit feels, so that masses come out right; repeatable")
       ->allow_extra_args(false);
-  app.add_option("--jobs", options.jobs, "flights read at a time")->check(CLI::Range(1U, 256U));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+  app.add_option("--jobs", options.jobs, "flights read at a time")->check(rt::is_whole_number(1, 256));
+  if (const auto ended = rt::parse_command_line(app, argc, argv)) return *ended;
   // Learning starts from nothing, whatever the configuration names.
   const auto config = unbalance::UnbalanceConfig::load_uncalibrated(options.config_path, options.overrides);
   if (!config) return rt::fail(EX_CONFIG, config.error());
@@ -122,9 +120,12 @@ int calibrate_unbalance(int argc, char** argv) {
     if (!trial) return rt::fail(EX_USAGE, trial.error());
     trials.push_back(std::move(*trial));
   }
+  if (const auto checked = rt::check_output_path(options.output); !checked) {
+    return rt::fail(EX_CANTCREAT, checked.error());
+  }
   const auto learned = learn_unbalance(options.logs, trials, *config, options.jobs);
   if (!learned) return rt::fail(EX_DATAERR, learned.error());
-  if (const auto written = write_file(options.output, to_toml(learned->calibration)); !written) {
+  if (const auto written = rt::write_file(options.output, to_toml(learned->calibration)); !written) {
     return rt::fail(EX_CANTCREAT, written.error());
   }
   print_summary(*learned, config->monitor);

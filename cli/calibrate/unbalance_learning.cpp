@@ -44,6 +44,7 @@ struct FlightRecord {
   UnbalancePowers powers;                              ///< at the end
   std::array<double, kMaxRotors> speed_error_ratio{};  ///< at the end
   std::int64_t judgements = 0;
+  std::int64_t after_onset = 0;  ///< judgements left out, for something was broken then
   UnbalanceNotJudged last_reason = UnbalanceNotJudged::kNotFlying;
 
   [[nodiscard]] double power() const {
@@ -130,7 +131,10 @@ rt::Expected<FlightRecord> read_flight(const std::string& log, const UnbalanceCo
   record.vehicle = flight->vehicle;
   record.rotors.resize(rotors);
   for (const Judgement& judgement : judgements) {
-    if (judgement.time >= until) continue;
+    if (judgement.time >= until) {
+      ++record.after_onset;
+      continue;
+    }
     keep(judgement, record);
     record.powers = judgement.powers;
     record.speed_error_ratio = judgement.speed_error_ratio;
@@ -249,18 +253,21 @@ const char* words_for(UnbalanceNotJudged reason) {
 
 rt::Expected<void> check_coverage(const std::vector<FlightRecord>& flights, std::size_t rotors) {
   std::int64_t judgements = 0;
+  std::int64_t after_onset = 0;
   UnbalanceNotJudged reason = UnbalanceNotJudged::kConverging;
   for (const FlightRecord& flight : flights) {
     judgements += flight.judgements;
+    after_onset += flight.after_onset;
     if (flight.last_reason != UnbalanceNotJudged::kNotFlying) reason = flight.last_reason;
   }
   const double period_s = to_seconds(UnbalanceMonitor::kPeriod);
   if (static_cast<double>(judgements) * period_s < kLeastJudged_s) {
-    return rt::fail_with(
-        fmt::format("only {:.1f} s of flight could be judged, {:g} s are needed; does it fly, with rotor "
-                    "speeds and inertial "
-                    "data?",
-                    static_cast<double>(judgements) * period_s, kLeastJudged_s));
+    const std::string why = after_onset > 0
+                                ? fmt::format("{:.1f} s more came after the onset of a fault in GROUND_TRUTH",
+                                              static_cast<double>(after_onset) * period_s)
+                                : "does it fly, with rotor speeds and inertial data?";
+    return rt::fail_with(fmt::format("only {:.1f} s of flight could be judged, {:g} s are needed; {}",
+                                     static_cast<double>(judgements) * period_s, kLeastJudged_s, why));
   }
   std::string errors;
   for (std::size_t i = 0; i < rotors; ++i) {

@@ -21,18 +21,11 @@ constexpr std::string_view kPrefix = "airworthy-";
 
 /// Every other airworthy-X is a process of the vehicle, or somebody's own command.
 constexpr std::array kTools{
-    About{"ack", "acknowledge a fault"},
     About{"calibrate", "learn the baselines of a vehicle from healthy flights"},
     About{"doctor", "check that this computer can run Airworthy, and print the cures"},
     About{"eval", "score detectors over recorded flights against the truth"},
-    About{"export", "convert recorded flights to other formats"},
     About{"import", "convert other formats to recorded flights"},
-    About{"keys", "make and list the keys of the feed"},
-    About{"part", "record the replacement of a part"},
-    About{"replay", "play a recorded flight into the detectors"},
-    About{"report", "summarise flights"},
     About{"sim", "simulate a vehicle"},
-    About{"up", "start the processes of a vehicle, for development"},
     About{"watch", "show the health of a vehicle live"},
 };
 

@@ -7,6 +7,7 @@
 #include "cli/doctor/findings.h"
 #include "cli/doctor/linux_probes.h"
 #include "cli/doctor/report.h"
+#include "runtime/process/command_line.h"
 
 int main(int argc, char** argv) {
   using namespace airworthy;
@@ -23,11 +24,7 @@ int main(int argc, char** argv) {
   app.add_option("--lcm-url", url, "bus to check; default LCM_DEFAULT_URL, else LCM's own default");
   app.add_option("--log-dir", log_directory, "folder that recordings go to; default the current one");
   app.add_flag("--json", json, "print a JSON object instead of text");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+  if (const auto ended = rt::parse_command_line(app, argc, argv)) return *ended;
 
   const auto address = doctor::parse_lcm_url(url);
   if (!address) {

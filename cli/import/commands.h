@@ -25,7 +25,12 @@ struct Request {
   std::optional<double> until_s;
 };
 
-using Logs = rt::Expected<std::vector<LogSummary>>;
+/// Why nothing was imported, and what the program ends with.
+struct Failure {
+  int exit_code;  ///< of sysexits.h
+  rt::Error error;
+};
+using Logs = tl::expected<std::vector<LogSummary>, Failure>;
 
 [[nodiscard]] Logs run(const Request& request);
 

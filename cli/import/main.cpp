@@ -1,5 +1,3 @@
-#include <sysexits.h>
-
 #include "cli/import/command_line.h"
 #include "runtime/process/exit.h"
 
@@ -9,5 +7,5 @@ int main(int argc, char** argv) {
   if (!request) return request.error();
   importer::stop_on_signals();
   const auto logs = importer::run(*request);
-  return logs ? importer::report(*logs, *request) : rt::fail(EX_DATAERR, logs.error());
+  return logs ? importer::report(*logs, *request) : rt::fail(logs.error().exit_code, logs.error().error);
 }

@@ -125,7 +125,7 @@ FixedTruth read_fixed_truth(ConfigTable table) {
   FixedTruth truth;
   truth.component = table.optional<std::string>("component", "");
   truth.fault_kind = table.required<std::string>("fault_kind");
-  truth.onset_s = table.if_present<double>("onset_s", rt::Range::at_least(0.0));
+  truth.onset_s = table.if_present<double>("onset_s", rt::Range{0.0, 1e10});
   truth.magnitude = table.optional<double>("magnitude", truth.magnitude, rt::Range{}.or_not_finite());
   if (truth.fault_kind == kNoFault && truth.onset_s) table.fail("onset_s", "a healthy flight has no onset");
   if (truth.fault_kind != kNoFault && truth.component.empty()) {

@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -17,6 +16,7 @@
 #include "cli/sim/flight.h"
 #include "cli/sim/live.h"
 #include "cli/sim/record.h"
+#include "runtime/process/command_line.h"
 #include "runtime/process/exit.h"
 
 namespace {
@@ -42,18 +42,6 @@ struct Options {
 volatile sig_atomic_t stop_requested = 0;
 
 void request_stop(int) { stop_requested = 1; }
-
-/// CLI::Range lets NaN through.
-CLI::Validator is_within(double least, double most) {
-  return CLI::Validator{[=](const std::string& text) -> std::string {
-                          double value = 0.0;
-                          if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) {
-                            return {};
-                          }
-                          return fmt::format("must lie in [{:g}, {:g}], is {}", least, most, text);
-                        },
-                        "NUMBER"};
-}
 
 /// A fault that the flight never reaches is told in the log's truth all the same: better ask.
 void warn_of_late_faults(const sim_command::Flight& flight) {
@@ -84,12 +72,14 @@ sim_command::Progress progress_bar(double duration_s) {
 
 rt::Expected<sim_command::Flight> read_flight(const Options& options) {
   auto vehicle = rt::VehicleFile::load(options.vehicle_path);
-  if (!vehicle) return tl::unexpected<rt::Error>{vehicle.error()};
-  if (!vehicle->multirotor) {
-    return rt::fail_with(options.vehicle_path + ": has no table [multirotor]: nothing to simulate");
+  if (vehicle && !vehicle->multirotor) {
+    vehicle = rt::fail_with(options.vehicle_path + ": has no table [multirotor]: nothing to simulate");
   }
-  const std::size_t rotors = vehicle->multirotor->rotor_count;
+  // Without a vehicle any rotor may be in a scenario: its other errors are told all the same.
+  const std::size_t rotors = vehicle ? vehicle->multirotor->rotor_count : kMaxRotors;
   auto scenario = sim::Scenario::load(options.scenario_path, rotors, options.overrides);
+  if (!vehicle && !scenario) return rt::fail_with(vehicle.error().text + "\n" + scenario.error().text);
+  if (!vehicle) return tl::unexpected<rt::Error>{vehicle.error()};
   if (!scenario) return tl::unexpected<rt::Error>{scenario.error()};
   sim_command::Flight flight{std::move(*vehicle),
                              std::move(*scenario),
@@ -147,30 +137,32 @@ int run_recorded(const Options& options, const sim_command::Flight& flight) {
 int run(int argc, char** argv) {
   CLI::App app{"Flies a simulated multirotor, healthy or with faults, into a log or live on a serial line.",
                "airworthy sim"};
+  app.set_version_flag("--version", "airworthy-sim " AIRWORTHY_VERSION);
   Options options;
   app.add_option("--vehicle", options.vehicle_path, "vehicle file with a table [multirotor]")->required();
   app.add_option("--scenario", options.scenario_path, "flight plan and faults, see config/scenarios")
       ->required();
   app.add_option("--set", options.overrides, "override of a key of the scenario, as KEY=VALUE; repeatable")
       ->allow_extra_args(false);
-  app.add_option("--level", options.level, "realism: nominal, hard or brutal; default hard")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Level>{
-          {"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}}));
+  rt::add_words<sim::Level>(
+      app, "--level", options.level,
+      {{"nominal", sim::Level::kNominal}, {"hard", sim::Level::kHard}, {"brutal", sim::Level::kBrutal}},
+      "realism; default hard");
   app.add_flag(
       "--rotors-alike", options.rotors_alike,
       "no wind, no difference between motors or propellers but their unbalance, thrust axes upright, mass in "
       "the middle, gyro without bias or drift, an estimate without noise: in a hover all rotors turn at one "
       "speed");
-  app.add_option("--seed", options.seed, "of all random numbers; default 1")->check(CLI::NonNegativeNumber);
+  app.add_option("--seed", options.seed, "of all random numbers; default 1")->check(rt::is_whole_number(0));
   app.add_option(
          "--vehicle-seed", options.vehicle_seed,
          "of what makes this vehicle differ from its file, to fly the same one again; default: --seed")
-      ->check(CLI::NonNegativeNumber);
+      ->check(rt::is_whole_number(0));
   app.add_option("--duration", options.duration_s, "seconds; default: the flight plan's")
-      ->check(is_within(0.01, 1e6));
+      ->check(rt::is_number(rt::Range{0.01, 1e6}));
   app.add_option("--imu-average", options.imu_average_ms,
                  "inertial samples are averages over so many ms instead of raw ones; 5 = as PX4 streams them")
-      ->check(is_within(0.5, 100.0));
+      ->check(rt::is_number(rt::Range{0.5, 100.0}));
   auto* log = app.add_option("-o,--output", options.log, "LCM log to write, as fast as the computer can");
   auto* live =
       app.add_option("--live", options.live,
@@ -180,14 +172,10 @@ int run(int argc, char** argv) {
   app.add_flag("--json", options.json, "print the summary as one line of JSON");
   app.add_option("--speed", options.speed, "--live: times the pace of the clock")
       ->needs(live)
-      ->check(is_within(0.01, 100.0));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+      ->check(rt::is_number(rt::Range{0.01, 100.0}));
+  if (const auto ended = rt::parse_command_line(app, argc, argv)) return *ended;
   if (options.log.empty() && options.live.empty()) {
-    return rt::fail(EX_USAGE, rt::Error{"--output LOG or --live LINK is needed"});
+    return rt::wrong_usage("--output LOG or --live LINK is needed");
   }
   const auto flight = read_flight(options);
   if (!flight) return rt::fail(EX_CONFIG, flight.error());

@@ -3,12 +3,15 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <optional>
 
 #include "cli/watch/feed_socket.h"
 #include "cli/watch/terminal.h"
 #include "cli/watch/watcher.h"
+#include "runtime/process/command_line.h"
 
 namespace {
 
@@ -72,15 +75,11 @@ int main(int argc, char** argv) {
   app.add_flag("--json", options.json, "print every message as one line of JSON");
   app.add_option("--count", options.count, "end after so many messages")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--timeout", options.timeout_s, "end after so long")
+      ->check(airworthy::rt::is_whole_number(1, std::numeric_limits<std::int64_t>::max()));
+  app.add_option("--timeout", options.timeout_s, "end after so many seconds")
       ->type_name("S")
-      ->check(CLI::PositiveNumber);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+      ->check(airworthy::rt::is_number(airworthy::rt::Range{0.0, 1e9}.without_min()));
+  if (const auto ended = airworthy::rt::parse_command_line(app, argc, argv)) return *ended;
   struct sigaction action {};
   action.sa_handler = [](int) { stopped = 1; };  // without SA_RESTART: a waiting receive returns
   sigaction(SIGINT, &action, nullptr);

@@ -16,6 +16,7 @@ using rt::Count;
 using rt::Range;
 
 constexpr int kMostRotors = 8;
+constexpr int kUsualRotors = 4;  // where the vehicle file does not say
 
 const std::vector<std::string> kImuMessages{"HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2",
                                             "SCALED_IMU3"};
@@ -62,9 +63,14 @@ void read_imu(ConfigTable table, MavlinkConfig& config) {
                                                      Range{0.0, 1.0}.or_not_finite());
 }
 
-void read_rotors(ConfigTable root, MavlinkConfig& config) {
+void read_rotors(ConfigTable root, const rt::VehicleFile& vehicle, MavlinkConfig& config) {
   ConfigTable table = root.table("rotors");
-  config.rotor_count = table.optional<int>("count", 4, Range{0, kMostRotors});
+  const int described = vehicle.multirotor ? static_cast<int>(vehicle.multirotor->rotor_count) : kUsualRotors;
+  config.rotor_count = table.optional<int>("count", described, Range{0, kMostRotors});
+  if (vehicle.multirotor && config.rotor_count != described) {
+    table.fail("count", fmt::format("{}, but vehicle \"{}\" is described with {} rotors", config.rotor_count,
+                                    vehicle.name, described));
+  }
   std::vector<int> identity;
   for (int rotor = 1; rotor <= config.rotor_count; ++rotor) identity.push_back(rotor);
   config.rotor_of_esc =
@@ -143,12 +149,13 @@ rt::Expected<MavlinkConfig> MavlinkConfig::load(const std::string& path,
   auto file = rt::ConfigFile::load(path, overrides);
   ConfigTable root = file.root();
   MavlinkConfig config;
-  config.vehicle = rt::VehicleFile::named_by(root).name;
+  const rt::VehicleFile vehicle = rt::VehicleFile::named_by(root);
+  config.vehicle = vehicle.name;
   config.link = read_link(root);
   config.silence = from_seconds(root.optional<double>("silence_s", 10.0, Range{1.0, 3600.0}));
   read_autopilot(root.table("autopilot"), config);
   read_imu(root.table("imu"), config);
-  read_rotors(root, config);
+  read_rotors(root, vehicle, config);
   read_flight_state(root.table("flight_state"), config);
   read_send(root.table("send"), config);
   config.hash = file.hash();

@@ -1,8 +1,10 @@
 #include "runtime/bus/log_bus.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 #include "runtime/bus/channels.h"
@@ -25,7 +27,12 @@ Expected<std::unique_ptr<LogBus>> LogBus::open(const std::string& path) {
   errno = 0;
   lcm_eventlog_t* log = lcm_eventlog_create(path.c_str(), "r");
   if (log == nullptr) return fail_with(fmt::format("{}: {}", path, std::strerror(errno)));
-  return std::unique_ptr<LogBus>{new LogBus{log, path}};
+  std::unique_ptr<LogBus> bus{new LogBus{log, path}};
+  struct stat about {};
+  if (::fstat(::fileno(log->f), &about) == 0 && S_ISDIR(about.st_mode)) {
+    return fail_with(fmt::format("{}: {}", path, std::strerror(EISDIR)));  // it opens, and cannot be read
+  }
+  return bus;
 }
 
 Expected<LogBus::Contents> LogBus::survey(const std::string& path) {

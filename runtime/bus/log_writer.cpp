@@ -6,20 +6,14 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
-#include <system_error>
 
 #include "runtime/bus/log_bus.h"
+#include "runtime/file/output_file.h"
 
 namespace airworthy::rt {
 
 Expected<std::unique_ptr<LogWriter>> LogWriter::create(const std::string& path) {
-  // commit() renames onto the target: that must not put a file in the place of a device or a folder.
-  std::error_code error;
-  const auto target = std::filesystem::status(path, error);
-  if (std::filesystem::exists(target) && !std::filesystem::is_regular_file(target)) {
-    return fail_with(fmt::format("{}: exists and is not a regular file", path));
-  }
+  if (const auto checked = check_output_path(path); !checked) return tl::unexpected<Error>{checked.error()};
   const std::string partial_path = path + ".partial";
   errno = 0;
   lcm_eventlog_t* log = lcm_eventlog_create(partial_path.c_str(), "w");

@@ -112,8 +112,9 @@ class ConfigTable {
   void fail(std::string_view key, std::string_view reason,
             std::initializer_list<std::string_view> because_of = {});
 
-  /// Reports a file named by `key` that is wrong in itself; its own errors follow those of this file.
-  void fail_in_other_file(const Error& error);
+  /// Reports a file named by `key` that is wrong in itself; its own errors follow those of this file. Nothing more is
+  /// said of the key.
+  void fail_in_other_file(std::string_view key, const Error& error);
 
   /// Adds something to the effective configuration, and so to the hash: the content of a file that `key`
   /// names.

@@ -381,7 +381,9 @@ void ConfigTable::fail(std::string_view key, std::string_view reason,
   if (!state_->has_failed(path)) state_->fail(state_->position_of(path), path, reason);
 }
 
-void ConfigTable::fail_in_other_file(const Error& error) { state_->fail_in_other_file(error); }
+void ConfigTable::fail_in_other_file(std::string_view key, const Error& error) {
+  state_->fail_in_other_file(join(path_, key), error);
+}
 
 void ConfigTable::record(std::string_view key, std::string_view value) {
   if (!silent_) state_->record(join(path_, key), std::string{value});

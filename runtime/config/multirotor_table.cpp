@@ -13,6 +13,7 @@ namespace {
 
 constexpr Range kPositive{1e-12, 1e6};
 constexpr Range kNotNegative{0.0, 1e6};
+constexpr Range kThrust_N_s2{1e-10, 0.1};  // of a propeller of 1 cm to one of 2 m
 constexpr Range kLength_m{-10.0, 10.0};
 constexpr std::size_t kMinRotors = 3;
 
@@ -61,13 +62,39 @@ void check_places(ConfigTable table, const Multirotor& vehicle) {
   }
 }
 
+/// Hovering, the rotors turn at a speed that the motors have.
+void check_hover(ConfigTable table, const Multirotor& vehicle) {
+  constexpr double kGravity_m_s2 = 9.81;
+  double lifting_rotors = 0.0;  // each by its share upward
+  for (const Rotor& rotor : vehicle.rotors()) lifting_rotors -= rotor.thrust_axis[2];
+  const double weight_N = vehicle.mass_kg * kGravity_m_s2;
+  const double lift_N_s2 = lifting_rotors * vehicle.thrust_coefficient_N_s2;
+  const double most_thrust_N = lift_N_s2 * vehicle.speed_max_rad_s * vehicle.speed_max_rad_s;
+  if (most_thrust_N < weight_N) {
+    table.fail("speed_max_rad_s",
+               fmt::format("all rotors at full speed lift {:.3g} N, less than the weight of {:.3g} N",
+                           most_thrust_N, weight_N),
+               {"mass_kg", "thrust_coefficient_N_s2", "speed_min_rad_s", "rotor"});
+    return;
+  }
+  const double hover_rad_s = std::sqrt(weight_N / lift_N_s2);
+  if (!(hover_rad_s > vehicle.speed_min_rad_s)) {
+    table.fail("speed_min_rad_s",
+               fmt::format(
+                   "{:g} must be less than the {:.4g} rad/s at which the rotors lift the weight of {:.3g} N: "
+                   "idling, the vehicle would climb",
+                   vehicle.speed_min_rad_s, hover_rad_s, weight_N),
+               {"mass_kg", "thrust_coefficient_N_s2", "speed_max_rad_s", "rotor"});
+  }
+}
+
 }  // namespace
 
 Multirotor read_multirotor(ConfigTable table) {
   Multirotor vehicle;
   vehicle.mass_kg = table.required<double>("mass_kg", Range{1e-3, 1e3});
   vehicle.inertia_kg_m2 = table.required<std::array<double, 3>>("inertia_kg_m2", kPositive);
-  vehicle.thrust_coefficient_N_s2 = table.required<double>("thrust_coefficient_N_s2", kPositive);
+  vehicle.thrust_coefficient_N_s2 = table.required<double>("thrust_coefficient_N_s2", kThrust_N_s2);
   vehicle.torque_ratio_m = table.required<double>("torque_ratio_m", Range{0.0, 1.0});
   vehicle.propeller_radius_m = table.required<double>("propeller_radius_m", Range{1e-3, 5.0});
   vehicle.propeller_inertia_kg_m2 = table.required<double>("propeller_inertia_kg_m2", kNotNegative);
@@ -96,15 +123,7 @@ Multirotor read_multirotor(ConfigTable table) {
     if (vehicle.rotor_count < kMaxRotors) vehicle.rotor[vehicle.rotor_count++] = read;
   }
   check_places(table, vehicle);
-  constexpr double kGravity_m_s2 = 9.81;
-  const double most_thrust_N = static_cast<double>(vehicle.rotor_count) * vehicle.thrust_coefficient_N_s2 *
-                               vehicle.speed_max_rad_s * vehicle.speed_max_rad_s;
-  if (most_thrust_N < vehicle.mass_kg * kGravity_m_s2) {
-    table.fail("speed_max_rad_s",
-               fmt::format("all rotors at full speed lift {:.3g} N, less than the weight of {:.3g} N",
-                           most_thrust_N, vehicle.mass_kg * kGravity_m_s2),
-               {"mass_kg", "thrust_coefficient_N_s2", "speed_min_rad_s", "rotor"});
-  }
+  check_hover(table, vehicle);
   return vehicle;
 }
 

@@ -28,7 +28,11 @@ class State {
   /// `path` is the full dotted path of the key that is wrong. Every key is complained about once: the first
   /// complaint is the cause of any further one.
   void fail(Position at, const std::string& path, std::string_view reason);
-  void fail_in_other_file(const Error& error) { other_files_.push_back(error.text); }
+  /// The key at `path` is in error by what the file it names says.
+  void fail_in_other_file(const std::string& path, const Error& error) {
+    failed_.insert(path);
+    other_files_.push_back(error.text);
+  }
 
   void record(const std::string& path, std::string value) { effective_[path] = std::move(value); }
 

@@ -45,7 +45,7 @@ VehicleFile VehicleFile::named_by(ConfigTable table, std::string_view key) {
   if (path.empty()) return {};
   auto vehicle = load(path);
   if (!vehicle) {
-    table.fail_in_other_file(vehicle.error());
+    table.fail_in_other_file(key, vehicle.error());
     return {};
   }
   table.record(fmt::format("{}.hash", key), vehicle->hash);

@@ -15,7 +15,7 @@ namespace airworthy::rt {
 
 enum class VehicleKind : std::uint8_t { kMultirotor, kFixedWing };
 
-/// What every process must know of the vehicle it runs on; config/vehicle.toml. Process files name it by a
+/// What every process must know of the vehicle it runs on; config/vehicle.toml or config/multirotor.toml. Process files name it by a
 /// key, by convention `vehicle = "vehicle.toml"`.
 struct VehicleFile {
   static constexpr std::size_t kMaxNameLength = 16;

@@ -8,7 +8,8 @@
 #include <cstdlib>
 #include <exception>
 #include <string_view>
-#include <utility>
+
+#include "runtime/process/command_line.h"
 
 namespace airworthy::rt {
 namespace {
@@ -20,25 +21,6 @@ std::string default_lcm_url() {
 
 tl::unexpected<Exit> bad_usage(std::string_view reason) {
   return tl::unexpected<Exit>{Exit{EX_USAGE, fmt::format("{}\nrun with --help for the options", reason)}};
-}
-
-/// An option that takes one of a few words.
-template <class Enum>
-void add_words(CLI::App& app, const std::string& option, Enum& target,
-               const std::vector<std::pair<std::string, Enum>>& words, const std::string& about) {
-  std::vector<std::string> names;
-  names.reserve(words.size());
-  for (const auto& [name, value] : words) names.push_back(name);
-  const auto choose = [&target, words, names, option](const std::string& chosen) {
-    for (const auto& [name, value] : words) {
-      if (name != chosen) continue;
-      target = value;
-      return;
-    }
-    throw CLI::ValidationError(option, fmt::format("must be one of {}", fmt::join(names, ", ")));
-  };
-  app.add_option_function<std::string>(option, choose, about)
-      ->type_name(fmt::format("{{{}}}", fmt::join(names, ",")));
 }
 
 std::string without_trailing_newlines(std::string text) {

@@ -38,13 +38,13 @@ class MavlinkConfigTest : public ::testing::Test {
 
 constexpr const char* kLink = "link = \"tcp:127.0.0.1:5760\"\n";
 
-TEST(MavlinkConfigFile, TheShippedOneEqualsTheDefaults) {
+TEST(MavlinkConfigFile, TheShippedOneHoldsTheDefaults) {
   const auto shipped = MavlinkConfig::load(AIRWORTHY_SOURCE_DIR "/config/mavlink.toml", {});
   ASSERT_TRUE(shipped) << shipped.error().text;
   EXPECT_FALSE(shipped->vehicle.empty());
   EXPECT_EQ(shipped->link.kind, LinkKind::kUdpListen);
   EXPECT_EQ(shipped->imu_sources, (std::vector<std::uint32_t>{105, 27, 26, 116, 129}));
-  EXPECT_EQ(shipped->rotor_of_esc, (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_EQ(shipped->rotor_of_esc, std::vector<int>{1});
   EXPECT_TRUE(std::isnan(shipped->averaging_window_s));
 }
 
@@ -96,6 +96,23 @@ request = [{message = "ESC_STATUS", rate_Hz = 50.0}]
   ASSERT_EQ(config->requests.size(), 1U);
   EXPECT_EQ(config->requests[0].message_id, 291U);
   EXPECT_NE(config->hash, defaults->hash);
+}
+
+TEST(MavlinkConfigFile, RotorsAreAsManyAsTheVehicleFileDescribes) {
+  const std::string multirotor = AIRWORTHY_SOURCE_DIR "/config/mavlink_multirotor.toml";
+  const auto shipped = MavlinkConfig::load(multirotor, {});
+  ASSERT_TRUE(shipped) << shipped.error().text;
+  EXPECT_EQ(shipped->rotor_count, 6);
+  EXPECT_EQ(shipped->outputs.size(), 6U);
+  const auto more = MavlinkConfig::load(multirotor, {"rotors.count=8"});
+  ASSERT_FALSE(more);
+  EXPECT_EQ(more.error().text, "--set rotors.count: 8, but vehicle \"hexa\" is described with 6 rotors");
+  const auto quad = MavlinkConfig::load(AIRWORTHY_SOURCE_DIR "/config/mavlink.toml",
+                                        {"vehicle=" AIRWORTHY_SOURCE_DIR "/config/vehicles/f450.toml"});
+  ASSERT_FALSE(quad);
+  EXPECT_NE(quad.error().text.find("rotors.count: 1, but vehicle \"f450\" is described with 4 rotors"),
+            std::string::npos)
+      << quad.error().text;
 }
 
 TEST_F(MavlinkConfigTest, SaysWhatIsWrongAndWhere) {

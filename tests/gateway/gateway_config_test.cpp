@@ -34,6 +34,13 @@ TEST(GatewayConfig, TheShippedFileHoldsTheDefaults) {
   EXPECT_THAT(config->health.feeds.at("airworthy-mavlink"), ElementsAre("airworthy-response"));
 }
 
+TEST(GatewayConfig, TheShippedFileOfAMultirotorExpectsItsDetectors) {
+  const auto config = GatewayConfig::load(AIRWORTHY_CONFIG_DIR "/gateway_multirotor.toml", {});
+  ASSERT_TRUE(config) << config.error().text;
+  EXPECT_TRUE(config->multirotor.has_value());
+  EXPECT_EQ(config->health.expected_processes.size(), 5U);
+}
+
 TEST(GatewayConfig, AnUnencryptedFeedStaysOnThisComputer) {
   EXPECT_THAT(error_with("feed.endpoint=tcp://0.0.0.0:5710"),
               HasSubstr("feed.endpoint: tcp://0.0.0.0:5710 can be reached from other computers"));
@@ -59,6 +66,10 @@ TEST(GatewayConfig, EachRuleIsChecked) {
   EXPECT_THAT(error_with("health.start_grace_s=-1"),
               HasSubstr("health.start_grace_s: must lie in [0, 600], is -1"));
   EXPECT_THAT(error_with("health.expected_processes=[\"\"]"), HasSubstr("is no process name"));
+  EXPECT_THAT(error_with("health.expected_processes=[\"x\", \"y\", \"x\"]"),
+              HasSubstr("health.expected_processes: \"x\" is named twice"));
+  EXPECT_THAT(error_with("health.source=[{process=\"x\", feeds=[\"y\", \"y\"]}]"),
+              HasSubstr("health.source[0].feeds: \"y\" is named twice"));
   std::string many = "health.expected_processes=[\"p\"";
   for (int i = 0; i < 40; ++i) many += ",\"p\"";
   EXPECT_THAT(error_with(many + "]"),

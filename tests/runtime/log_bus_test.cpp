@@ -121,6 +121,13 @@ TEST_F(LogBusTest, AFileThatIsNoLogIsAnError) {
   EXPECT_FALSE((*bus)->play(clock_, only_vehicle));
 }
 
+TEST_F(LogBusTest, AFolderIsNoLog) {
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  const auto bus = LogBus::open(folder);
+  ASSERT_FALSE(bus);
+  EXPECT_EQ(bus.error().text, folder + ": Is a directory");
+}
+
 TEST_F(LogBusTest, AMissingFileIsAnErrorThatNamesIt) {
   const auto bus = LogBus::open("/nonexistent/flight.lcm");
   ASSERT_FALSE(bus);

@@ -131,6 +131,9 @@ TEST_F(LogWriterTest, NothingButAFileIsReplaced) {
   ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
   EXPECT_EQ(LogWriter::create(path_).error().text, path_ + ": exists and is not a regular file");
   EXPECT_TRUE(std::filesystem::is_fifo(path_));
+  const std::string link = folder_.path() / "link.lcm";
+  std::filesystem::create_symlink(folder_.write("older.lcm", "older"), link);
+  EXPECT_EQ(LogWriter::create(link).error().text, link + ": exists and is not a regular file");
   const std::string folder = folder_.path().string();
   EXPECT_EQ(LogWriter::create(folder).error().text, folder + ": exists and is not a regular file");
 }

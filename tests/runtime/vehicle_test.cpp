@@ -84,19 +84,42 @@ TEST(Vehicle, FileThatIsNotThere) {
   EXPECT_EQ(errors_of(unnamed), "process.toml:1:1: vehicle: missing mandatory key");
 }
 
-TEST(Vehicle, ShippedFileIsValid) {
-  const auto vehicle =
-      VehicleFile::load(std::filesystem::path{AIRWORTHY_SOURCE_DIR} / "config" / "vehicle.toml");
-  ASSERT_TRUE(vehicle.has_value()) << vehicle.error().text;
-  EXPECT_TRUE(VehicleFile::is_valid_name(vehicle->name));
+TEST(Vehicle, NothingIsSaidOfWhatAFileDoesNotHaveThatIsNotThere) {
+  auto file = ConfigFile::parse("vehicle = \"nope.toml\"\n", "/nowhere/process.toml");
+  ConfigTable root = file.root();
+  if (!VehicleFile::named_by(root).multirotor) root.fail("vehicle", "has no table [multirotor]");
+  EXPECT_EQ(errors_of(file), "/nowhere/nope.toml: cannot be opened: No such file or directory");
+}
+
+const std::filesystem::path kShipped = std::filesystem::path{AIRWORTHY_SOURCE_DIR} / "config";
+
+TEST(Vehicle, ShippedFilesAreValid) {
+  std::vector<std::filesystem::path> files{kShipped / "vehicle.toml", kShipped / "multirotor.toml"};
+  for (const auto& entry : std::filesystem::directory_iterator{kShipped / "vehicles"})
+    files.push_back(entry.path());
+  EXPECT_GE(files.size(), 11U);
+  for (const auto& path : files) {
+    const auto vehicle = VehicleFile::load(path);
+    EXPECT_TRUE(vehicle.has_value()) << vehicle.error().text;
+  }
+}
+
+TEST(Vehicle, TheDocumentedMultirotorIsTheHexarotorOfTheEvidence) {
+  const auto documented = VehicleFile::load(kShipped / "multirotor.toml");
+  const auto measured = VehicleFile::load(kShipped / "vehicles" / "unbalance_hexa.toml");
+  ASSERT_TRUE(documented.has_value() && measured.has_value());
+  EXPECT_EQ(documented->hash, measured->hash);
 }
 
 /// A multirotor with these hubs; the first line of a rotor is 16, then every third.
-std::string multirotor_with(const std::vector<std::string>& positions, const std::string& mass = "1.0") {
+std::string multirotor_with(const std::vector<std::string>& positions, const std::string& mass = "1.0",
+                            const std::string& thrust = "1e-5", const std::string& speed_min = "100") {
   std::string text = "name = \"v\"\nkind = \"multirotor\"\n[multirotor]\nmass_kg = " + mass +
-                     "\ninertia_kg_m2 = [0.01, 0.01, 0.02]\nthrust_coefficient_N_s2 = 1e-5\n"
-                     "torque_ratio_m = 0.01\npropeller_radius_m = 0.1\npropeller_inertia_kg_m2 = 1e-5\n"
-                     "motor_time_constant_s = 0.03\nspeed_min_rad_s = 100\nspeed_max_rad_s = 900\n"
+                     "\ninertia_kg_m2 = [0.01, 0.01, 0.02]\nthrust_coefficient_N_s2 = " + thrust +
+                     "\ntorque_ratio_m = 0.01\npropeller_radius_m = 0.1\npropeller_inertia_kg_m2 = 1e-5\n"
+                     "motor_time_constant_s = 0.03\nspeed_min_rad_s = " +
+                     speed_min +
+                     "\nspeed_max_rad_s = 900\n"
                      "gear_height_m = 0.1\ngear_radius_m = 0.1\n";
   for (const std::string& position : positions) {
     text += "[[multirotor.rotor]]\nposition_m = " + position + "\nspin = \"clockwise\"\n";
@@ -131,6 +154,16 @@ TEST(MultirotorTable, RefusesWhatCannotFly) {
   EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "4.0")),
             "v.toml:12:1: multirotor.speed_max_rad_s: all rotors at full speed lift 32.4 N, less than the "
             "weight of 39.2 N");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "1.0", "1e-5", "600")),
+            "v.toml:11:1: multirotor.speed_min_rad_s: 600 must be less than the 495.2 rad/s at which the "
+            "rotors lift "
+            "the weight of 9.81 N: idling, the vehicle would climb");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "1.0", "8.5")),
+            "v.toml:6:1: multirotor.thrust_coefficient_N_s2: must lie in [1e-10, 0.1], is 8.5");
+  EXPECT_EQ(errors_of_vehicle(multirotor_with(kSquare, "1.0", "0.01")),
+            "v.toml:11:1: multirotor.speed_min_rad_s: 100 must be less than the 15.66 rad/s at which the "
+            "rotors lift "
+            "the weight of 9.81 N: idling, the vehicle would climb");
   auto twice = kSquare;
   twice.push_back(kSquare[1]);
   EXPECT_EQ(errors_of_vehicle(multirotor_with(twice)),

@@ -210,7 +210,7 @@ class Import(unittest.TestCase):
             log, _ = self.import_table(name, map_name, *arguments)
             return [(message.text(), message.text(), *message.read(">qd")) for message in channel(log, "GROUND_TRUTH")]
         ((component, kind, onset_us, _),) = truths("bebop2_prop_eject/flight01_11-43-10.csv.xz", "bebop2_prop_eject.toml")
-        self.assertEqual((component, kind, onset_us), ("rotor 2", "propeller_loss", 518335767 + 12390000))
+        self.assertEqual((component, kind, onset_us), ("rotor 2", "propeller_lost", 518335767 + 12390000))
         self.assertEqual(truths("rflymad_sim/TestCase_3_2000000002", "rflymad_sim.toml"),
                          [("rotor 1", "loss_of_effectiveness", 54415792, 0.8)])
         found = truths("crazypad/controller/tape_on_propeller_M1_M3__E9_log02.csv.xz", "crazypad_controller.toml")

@@ -7,7 +7,7 @@ import system_test
 from recording import events, lost_messages, play_inputs, python_bindings, record
 from system_test import SystemTest, alive
 
-VEHICLE_FILE = "vehicles/unbalance_hexa.toml"
+VEHICLE_FILE = "multirotor.toml"
 VEHICLE = "hexa"
 DETECTORS = {"airworthy-unbalance": "unbalance.toml", "airworthy-effectiveness": "effectiveness.toml",
              "airworthy-actuator": "actuator.toml"}
@@ -19,15 +19,15 @@ class MultirotorReplay(SystemTest):
         for name, config in DETECTORS.items():
             # Not calibrated, so that the chip must stand out of what propellers may have: less is allowed them here.
             allowed = ["threshold.usual=40"] if name == "airworthy-unbalance" else []
-            rig.start_service(name, config, [f"vehicle={rig.config / VEHICLE_FILE}", *allowed])
+            rig.start_service(name, config, allowed)
 
     def fly(self):
         rig = self.rig(1.0)
         feed = self.feed(rig)
         log = record(rig, "live.lcm")
-        rig.start_gateway(config="demo/gateway.toml")
+        rig.start_gateway(config="gateway_multirotor.toml")
         self.start_detectors(rig)
-        rig.start_driver(config="demo/mavlink.toml")
+        rig.start_driver(config="mavlink_multirotor.toml")
         up = feed.wait_for(lambda kind, document: kind == "health" and alive(document) >= {"airworthy-mavlink", *DETECTORS}, 20)
         self.assertIsNotNone(up, f"the system did not come up: {rig.dead()}")
         flight = rig.start_simulation(VEHICLE_FILE, "scenarios/demo.toml", "--duration", 49)

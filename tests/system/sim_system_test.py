@@ -51,10 +51,21 @@ class Sim(unittest.TestCase):
                  says="--set segment[0].duration_s: must lie in [0.1, 1000000], is -1")
         self.assertFalse(self.log.exists())
 
+    def test_errors_of_both_files_are_told(self):
+        scenario = self.folder / "s.toml"
+        scenario.write_text('[[segment]]\nmanoeuvre = "swim"\nduration_s = 1\n')
+        vehicle = self.folder / "v.toml"
+        vehicle.write_text('name = "a b"\nkind = "multirotor"\n')
+        done = self.sim("-o", self.log, scenario=scenario, vehicle=vehicle, code=CONFIG_ERROR, says=f"{vehicle}:1:1: name: must")
+        self.assertIn(f"airworthy-sim: {scenario}:2:1: segment[0].manoeuvre: must be one of", done.stderr)
+
     def test_a_wrong_command_line_is_refused(self):
         for option, value in (("--duration", "0"), ("--duration", "-3"), ("--duration", "nan"), ("--duration", "1e9"),
-                              ("--seed", "-1"), ("--seed", "x"), ("--level", "easy"), ("--imu-average", "0.3")):
-            self.sim(option, value, "-o", self.log, code=USAGE, says=option)
+                              ("--seed", "-1"), ("--seed", "x"), ("--seed", "18446744073709551616"),
+                              ("--seed", "99999999999999999999999"), ("--vehicle-seed", "1e3"), ("--level", "easy"),
+                              ("--level", "2"), ("--imu-average", "0.3"), ("--speed", "nan")):
+            self.sim(option, value, "--live" if option == "--speed" else "-o", self.log, code=USAGE,
+                     says=f"airworthy-sim: {option}: must ")
         self.sim(code=USAGE, says="airworthy-sim: --output LOG or --live LINK is needed")
         self.sim("-o", self.log, "--live", self.folder / "fc", code=USAGE, says="excludes")
         self.assertFalse(self.log.exists())

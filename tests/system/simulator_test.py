@@ -15,17 +15,17 @@ def rate(health, name):
 
 class SimulatorTest(SystemTest):
     DETECTORS = ("unbalance", "effectiveness", "actuator")
-    HEXACOPTER = "vehicles/unbalance_hexa.toml"
+    HEXACOPTER = "multirotor.toml"
 
     def start_detector(self, rig, name):
-        rig.start_service(f"airworthy-{name}", f"{name}.toml", [f"vehicle={rig.config / self.HEXACOPTER}"])
+        rig.start_service(f"airworthy-{name}", f"{name}.toml")
 
     def start_driver(self, rig):
-        rig.start_driver(config="demo/mavlink.toml")
+        rig.start_driver(config="mavlink_multirotor.toml")
 
     def start_all(self, rig, feed):
-        rig.start_gateway(config="demo/gateway.toml")
-        rig.start_response([f"vehicle={rig.config / self.HEXACOPTER}"], config="response_multirotor.toml")
+        rig.start_gateway(config="gateway_multirotor.toml")
+        rig.start_response(config="response_multirotor.toml")
         for name in self.DETECTORS:
             self.start_detector(rig, name)
         self.start_driver(rig)

@@ -121,7 +121,7 @@ class Calibrate(unittest.TestCase):
     def test_an_output_that_cannot_be_written_is_an_error(self):
         done = self.calibrate(self.folder / "missing" / "out.toml")
         self.assertEqual(done.returncode, 73)
-        self.assertIn("out.toml: cannot be written", done.stderr)
+        self.assertIn("out.toml: cannot be written: No such file or directory", done.stderr)
 
 
 class Effectiveness(unittest.TestCase):

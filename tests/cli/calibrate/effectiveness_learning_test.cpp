@@ -52,7 +52,9 @@ struct Flown {
 };
 
 effectiveness::EffectivenessConfig quad_config() {
-  auto config = effectiveness::EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml", {});
+  auto config = effectiveness::EffectivenessConfig::load(
+      AIRWORTHY_CONFIG "/effectiveness.toml",
+      {"vehicle=" AIRWORTHY_CONFIG "/vehicles/unbalance_medium.toml"});
   EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
   return *config;
 }
@@ -213,6 +215,9 @@ TEST(EffectivenessLearning, RefusesTooLittleFlightAndMissingSpeeds) {
   const auto brief = learn_effectiveness({flown.recording}, config);
   ASSERT_FALSE(brief.has_value());
   EXPECT_THAT(brief.error().text, HasSubstr("only 2.0 s of free flight"));
+  flown.recording.after_onset_s = 30.0;
+  EXPECT_THAT(learn_effectiveness({flown.recording}, config).error().text,
+              HasSubstr("8 s are needed; 30.0 s more came after the onset of a fault in GROUND_TRUTH"));
 }
 
 }  // namespace

@@ -98,6 +98,14 @@ TEST_F(UnbalanceLearningTest, LearnsBaselineNoiseLagAndWithATrialMassTheResponse
   EXPECT_TRUE(learned->notes.empty()) << learned->notes.front();
 }
 
+TEST_F(UnbalanceLearningTest, AFaultFromTheStartIsToldFromAFlightThatNeverFlew) {
+  const auto learned = learn_unbalance({log("trial")}, {}, *config_, 2);
+  ASSERT_FALSE(learned.has_value());
+  EXPECT_NE(learned.error().text.find("s more came after the onset of a fault in GROUND_TRUTH"),
+            std::string::npos)
+      << learned.error().text;
+}
+
 TEST(UnbalanceLearning, PowersOfFlightsThatTaughtTooLittleDoNotCount) {
   const auto mean = mean_powers({{{1.0, 4.0}, kLeastJudged_s}, {{3.0, 0.0}, 60.0}, {{900.0, 900.0}, 5.0}});
   EXPECT_EQ(mean[0], 2.0);

@@ -2,13 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <set>
 #include <thread>
 
 #include "tests/gateway/feed/feed_bench.h"
+#include "tests/runtime/temporary_folder.h"
 
 namespace airworthy::gateway {
 namespace {
@@ -16,8 +16,10 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
+/// A socket in a folder that is gone at the end of the program, whether or not the publisher removes it.
 std::string ipc_endpoint(const std::string& name) {
-  return "ipc:///tmp/airworthy-feed-test-" + std::to_string(getpid()) + "-" + name;
+  static const rt::TemporaryFolder folder;
+  return "ipc://" + (folder.path() / name).string();
 }
 
 FeedConfig at(const std::string& endpoint) {

@@ -15,8 +15,8 @@ const std::string kShipped = AIRWORTHY_SOURCE_DIR "/config/actuator.toml";
 TEST(ActuatorConfig, TheShippedFileIsValidAndSaysTheDefaults) {
   const auto config = ActuatorConfig::load(kShipped, {});
   ASSERT_TRUE(config) << config.error().text;
-  EXPECT_EQ(config->vehicle, "f450");
-  EXPECT_EQ(config->monitor.vehicle.rotor_count, 4U);
+  EXPECT_EQ(config->vehicle, "hexa");
+  EXPECT_EQ(config->monitor.vehicle.rotor_count, 6U);
   const ActuatorMonitorParams defaults;
   EXPECT_EQ(config->monitor.gyro_sigma_rad_s, defaults.gyro_sigma_rad_s);
   EXPECT_EQ(config->monitor.disturbance_ratio, defaults.disturbance_ratio);
@@ -36,8 +36,7 @@ class ActuatorConfigTest : public ::testing::Test {
  protected:
   ActuatorConfigTest() {
     std::filesystem::create_directories(folder_ / "vehicles");
-    std::filesystem::copy_file(AIRWORTHY_SOURCE_DIR "/config/vehicles/f450.toml",
-                               folder_ / "vehicles/f450.toml");
+    std::filesystem::copy_file(AIRWORTHY_SOURCE_DIR "/config/multirotor.toml", folder_ / "multirotor.toml");
     std::ofstream{folder_ / "vehicles/plane.toml"} << "name = \"p\"\nkind = \"fixed_wing\"\n";
   }
   ~ActuatorConfigTest() override { std::filesystem::remove_all(folder_); }

@@ -62,7 +62,7 @@ Calibration learned() {
 TEST_F(EffectivenessConfigTest, TheShippedFileSaysWhatIsTheDefault) {
   const auto config = EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml", {});
   ASSERT_TRUE(config.has_value()) << config.error().text;
-  EXPECT_EQ(config->vehicle, "medium");
+  EXPECT_EQ(config->vehicle, "hexa");
   const EffectivenessParams defaults;
   EXPECT_EQ(config->monitor.noise.acceleration_ratio, defaults.noise.acceleration_ratio);
   EXPECT_EQ(config->monitor.noise.gain_error_ratio, defaults.noise.gain_error_ratio);

@@ -21,7 +21,8 @@ using ::testing::HasSubstr;
 constexpr double kOnset_s = 12.0;
 
 EffectivenessConfig quad_config() {
-  auto config = EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml", {});
+  auto config = EffectivenessConfig::load(AIRWORTHY_CONFIG "/effectiveness.toml",
+                                          {"vehicle=" AIRWORTHY_CONFIG "/vehicles/unbalance_medium.toml"});
   EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
   return *config;
 }

@@ -153,6 +153,10 @@ TEST_F(UnbalanceConfigTest, ACalibrationThatDoesNotFitIsRefused) {
   EXPECT_EQ(error_of(text + "[input]\naccel_low_pass_Hz = 90\n"),
             "unbalance.toml:2:1: calibration: was learned with input.accel_low_pass_Hz = 0, which is now 90. "
             "Calibrate again.");
+  write("calibration.toml", "vehicle = \"medium\"\ngyro_noise_rad_s = 0.01\n");
+  EXPECT_EQ(error_of(text), "calibration.toml: is a calibration for airworthy-effectiveness");
+  write("calibration.toml", "vehicle = \"medium\"\n[[configuration]]\nairspeed_sensor = false\n");
+  EXPECT_EQ(error_of(text), "calibration.toml: is a calibration for airworthy-response");
   write("calibration.toml", "vehicle = \"medium\"\n");
   EXPECT_NE(error_of(text).find("calibration.toml:1:1: rotor: "), std::string::npos) << error_of(text);
 }
