@@ -337,7 +337,8 @@ rt::DetectorReport EffectivenessService::report() {
   node_.counters()["samples_refused"] = monitor_.times_gone_back() + monitor_.samples_dropped();
   node_.counters()["speeds_refused"] = monitor_.speeds().refused_speeds();
   node_.counters()["messages_refused"] = monitor_.speeds().refused_messages();
-  node_.counters()["unexplained_disturbances"] = monitor_.test().unexplained_disturbances();
+  node_.counters()["unexplained_disturbances"] =
+      monitor_.test().unexplained_disturbances() + monitor_.impossible_gains();
   return report;
 }
 

@@ -40,6 +40,7 @@ constexpr double kLeastRate_Hz = 50.0;  // below, usual gaps exceed what the fil
 constexpr Duration kLeastAge{4'000};    // of the evidence: a blow shows within a sample, a loss builds up
 constexpr double kSurelyPartial = 0.5;  // effectiveness that no lost propeller shows ...
 constexpr Duration kEarliestPartial{15'000};  // ... after so long
+constexpr double kLeastLeft = 0.1;            // of a rotor that may yet come back
 constexpr double kCautious = 2.0;             // times the threshold near the ground
 
 std::array<LossRange<double>, kLossRanges> ranges_of(const EffectivenessParams& params) {
@@ -188,7 +189,7 @@ std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
     event = step(sample, now);
     const auto excess = watch_slowly(sample);
     if (excess && (excess->is_first || excess->is_over)) {
-      effectiveness_[excess->rotor] = std::max(0.0, excess->effectiveness);
+      set_effectiveness(excess->rotor, excess->effectiveness);
       needs_start_ = true;
     }
     // Never both: what the fast test has found is believed at once, and the slow evidence starts over.
@@ -267,7 +268,8 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
   if (sample.phase != Phase::kInFlight && !may_land) {
     in_flight_since_.reset();
     slow_.end_flight();
-    for (double& believed : effectiveness_) believed = std::min(believed, 1.0);  // it may have been changed
+    for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i)
+      set_effectiveness(i, std::min(effectiveness_[i], 1.0));  // it may have been changed
   }
   if (sample.phase != Phase::kInFlight && !cautious_) return Muted::kPhase;
   if (mean_step_s_ > 1.0 / kLeastRate_Hz) return Muted::kTooSlow;
@@ -519,7 +521,14 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   const Duration age = sample.time - finding->onset;
   if (age < kLeastAge) return std::nullopt;
   // A rotor that falls silent may stand still: that is for its next report to say. A gain of another looks like it.
-  if (is_silent(finding->rotor, now) || (finding->loss < 0.0 && is_any_silent(now))) return std::nullopt;
+  const bool is_return = finding->loss < 0.0;
+  if (is_silent(finding->rotor, now) || (is_return && is_any_silent(now))) return std::nullopt;
+  // No propeller grows in flight: what fits the gain of a rotor that had lost nothing is something else.
+  if (is_return && !has_lost(finding->rotor)) {
+    ++impossible_gains_;
+    test_.reset();
+    return std::nullopt;
+  }
   LossEvent event;
   event.rotor = finding->rotor;
   event.effectiveness = effectiveness_[event.rotor] * (1.0 - finding->loss);
@@ -532,7 +541,7 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   const bool is_lost = event.probability > params_.lost_probability;
   // The first milliseconds show less than is lost: filters of the sensor hold back what has just begun.
   const bool is_partial = event.effectiveness > kSurelyPartial && age >= kEarliestPartial;
-  if (!is_lost && !is_partial && age < params_.most_classifying) return std::nullopt;
+  if (!is_lost && !is_partial && !is_return && age < params_.most_classifying) return std::nullopt;
   const auto kind = kind_of(event);
   if (!kind) {
     follow(event.rotor, event.effectiveness, *finding);
@@ -562,9 +571,8 @@ std::optional<LossKind> EffectivenessMonitor::kind_of(const LossEvent& event) co
   const double dead = dead_ratio();
   const double believed = effectiveness_[event.rotor];
   const bool was_over = believed > 1.0 + dead;
-  const bool was_partial = believed < 1.0 - dead;
   if (event.probability > 0.5) return LossKind::kPropellerLost;
-  if (was_partial || event.effectiveness <= 1.0 - dead) return LossKind::kPartialLoss;
+  if (has_lost(event.rotor) || event.effectiveness <= 1.0 - dead) return LossKind::kPartialLoss;
   if (was_over || event.effectiveness > 1.0 + dead) return LossKind::kOverEffective;
   return std::nullopt;
 }
@@ -580,12 +588,22 @@ void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& 
 
 void EffectivenessMonitor::follow(std::size_t rotor, double effectiveness,
                                   const Test::Finding& finding) noexcept {
-  effectiveness_[rotor] = std::max(0.0, effectiveness);
+  set_effectiveness(rotor, effectiveness);
   slow_.believe(rotor, effectiveness_[rotor]);
   for (std::size_t axis = 0; axis < 2; ++axis)
     rate_[axis].shift(finding.rate_shift[axis], finding.disturbance_shift[axis]);
   vertical_.shift(finding.disturbance_shift[2]);
   test_.reset();
+}
+
+void EffectivenessMonitor::set_effectiveness(std::size_t rotor, double effectiveness) noexcept {
+  effectiveness_[rotor] = std::max(0.0, effectiveness);
+  const double whole = (1.0 + dead_ratio()) / std::max(effectiveness_[rotor], kLeastLeft);
+  test_.may_return(rotor, has_lost(rotor) ? whole - 1.0 : 0.0);
+}
+
+bool EffectivenessMonitor::has_lost(std::size_t rotor) const noexcept {
+  return effectiveness_[rotor] < 1.0 - dead_ratio();
 }
 
 std::optional<SlowEvidence::Excess> EffectivenessMonitor::watch_slowly(const Inertial& sample) noexcept {

@@ -19,7 +19,7 @@
 
 namespace airworthy::effectiveness {
 
-/// A sudden great loss, a smaller one that shows later, and a sudden gain.
+/// A sudden great loss, a smaller one that shows later, and a gain: the return of what was lost.
 inline constexpr std::size_t kLossRanges = 3;
 
 /// How far the model may be wrong. Accelerations in shares of what one rotor gives in hover, so that the same
@@ -171,6 +171,8 @@ class EffectivenessMonitor {
   [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
   [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
+  /// How often the motion fitted best what no rotor does in flight: a gain of one that had lost nothing.
+  [[nodiscard]] std::int64_t impossible_gains() const noexcept { return impossible_gains_; }
 
  private:
   struct Inertial {
@@ -202,6 +204,9 @@ class EffectivenessMonitor {
   std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
   /// Below it, effectiveness differs from 1 by nothing worth a word.
   [[nodiscard]] double dead_ratio() const noexcept;
+  /// Whether rotor i is believed to give less than that.
+  [[nodiscard]] bool has_lost(std::size_t rotor) const noexcept;
+  void set_effectiveness(std::size_t rotor, double effectiveness) noexcept;
   /// Nothing where the rotor is within the dead ratio, and nothing was said of it.
   [[nodiscard]] std::optional<LossKind> kind_of(const LossEvent& event) const noexcept;
   void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
@@ -260,6 +265,7 @@ class EffectivenessMonitor {
   double judged_s_ = 0.0;
   std::int64_t times_gone_back_ = 0;
   std::int64_t dropped_ = 0;
+  std::int64_t impossible_gains_ = 0;
   // Small ones together: no padding between the others.
   SpeedSource source_ = SpeedSource::kNone;
   bool needs_start_ = false;
