@@ -343,6 +343,10 @@ void EffectivenessMonitor::start(const Inertial& sample) noexcept {
   const double sigma = kFirstDisturbance * authority_[2];
   vertical_.start(sigma * sigma);
   mean_vertical_m_s2_ = -kGravity_m_s2;
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    const double speed = speeds_.speed(i);
+    usual_speed2_[i] = speed * speed;
+  }
   test_.reset();
 }
 
@@ -367,6 +371,7 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   std::array<double, 3> u{};
   std::array<double, 3> timing_variance{};
   std::array<double, 3> gap_variance{};
+  std::array<double, 3> rotor_variance{};
   // A stamp of arrival says when within a step: what turns so fast was measured elsewhere by so much.
   const double stamp_error_s = params_.learns_inertial_delay ? kArrivalError * mean_step_s_ : 0.0;
   const double timing_error_s =
@@ -388,7 +393,11 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     const std::array b{effectiveness_[i] * B[kRollRow][i], effectiveness_[i] * B[kPitchRow][i],
                        effectiveness_[i] * vertical_at_imu_[i]};
     motion.contribution[i] = {b[0] * mean, b[1] * mean, b[2] * now};
+    // What it usually gives is in the disturbance already.
+    usual_speed2_[i] += dt_s / (kMeanTime_s + dt_s) * (speed * speed - usual_speed2_[i]);
+    const double unusual = noise.rotor_error_ratio * (speed * speed - usual_speed2_[i]);
     for (std::size_t axis = 0; axis < 3; ++axis) {
+      rotor_variance[axis] += b[axis] * b[axis] * unusual * unusual;
       u[axis] += motion.contribution[i][axis];
       timing_variance[axis] += b[axis] * b[axis] * late * late;
       gap_variance[axis] += b[axis] * b[axis] * gap * gap;
@@ -408,7 +417,8 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     const double variance = square(noise.acceleration_ratio * authority_[axis]) +
                             square(noise.gain_error_ratio * net) + timing_variance[axis];
     motion.rate[axis] = rate_[axis].step(dt_s, u[axis], sample.gyro_rad_s[axis],
-                                         {2.0 * (variance * noise.correlation_s + gap_variance[axis] * gap_s),
+                                         {2.0 * (variance * noise.correlation_s + gap_variance[axis] * gap_s +
+                                                 rotor_variance[axis] * noise.rotor_correlation_s),
                                           square(noise.disturbance_ratio_per_sqrt_s * authority_[axis])},
                                          gyro_variance_[axis].value + square(stamp_error_s * net));
     gyro_variance_[axis].step(motion.rate[axis].innovation, motion.rate[axis].variance, dt_s);
@@ -423,7 +433,8 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   const double change = noise.gain_error_ratio * (u[2] - mean_vertical_m_s2_);
   const double density = square(noise.vertical_ratio_per_sqrt_s * authority_[2]) +
                          2.0 * (timing_variance[2] + square(change)) / noise.vertical_correlation_s +
-                         2.0 * gap_variance[2] / std::max(gap_s, noise.vertical_correlation_s);
+                         2.0 * gap_variance[2] / std::max(gap_s, noise.vertical_correlation_s) +
+                         2.0 * rotor_variance[2] / noise.rotor_correlation_s;
   motion.vertical =
       vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(), sample.accel_m_s2[2],
                      density, accel_variance_.value + square(stamp_error_s * lift_change));

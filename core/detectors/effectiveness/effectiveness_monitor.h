@@ -28,6 +28,8 @@ struct ModelNoise {
   double acceleration_ratio = 0.04;  ///< always there, correlated over `correlation_s`
   double gain_error_ratio = 0.2;     ///< of the acceleration that the rotors give at this moment
   double correlation_s = 0.01;
+  double rotor_error_ratio = 0.1;  ///< of what each rotor's thrust differs from usual: arms, propellers, air
+  double rotor_correlation_s = 0.05;
   double vertical_correlation_s = 0.03;
   double lag_error_ratio = 0.1;  ///< of the motors' time constant ...
   double latency_error_s =
@@ -225,6 +227,7 @@ class EffectivenessMonitor {
   std::array<double, kMaxRotors> effectiveness_{};
   std::array<double, kMaxRotors> speed_before_{};
   std::array<double, kMaxRotors> mean_speed2_{};  ///< since the sample before
+  std::array<double, kMaxRotors> usual_speed2_{};
   std::array<std::array<double, 2>, kMaxRotors> inflow_per_rate_{};
   std::array<double, kMaxRotors> vertical_at_imu_{};
   double hover_speed_sum_ = 1.0;
