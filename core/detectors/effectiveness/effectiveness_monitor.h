@@ -16,6 +16,7 @@
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "core/estimators/effectiveness/rotor_speed_predictor.h"
 #include "core/estimators/effectiveness/stream_delay.h"
+#include "core/time/stamp_gate.h"
 
 namespace airworthy::effectiveness {
 
@@ -70,9 +71,11 @@ enum class Muted : std::uint8_t {
   kNoThrust,        ///< the rotors hardly lift: what one of them lost would not show
   kStruck,          ///< pushed from the side, as no rotor can
   kTooSlow,         ///< inertial data come less often than kLeastRate_Hz
+  kFrozen,          ///< the inertial unit repeats itself: nothing is measured
   kNoSpeeds,        ///< neither reports nor commands
   kDelayUnknown,    ///< not yet known how much later than the speeds the inertial data come
   kTelemetry,       ///< of one rotor implausible, frozen or missing
+  kSpeedsLate,      ///< without commands, reports come too seldom or too late
   kMappingUnknown,  ///< nothing has yet shown that the rotors are numbered as described
   kRotorMapping,    ///< the vehicle moves as if the rotors were numbered otherwise
   kRotorLost,       ///< what is left cannot be judged
@@ -171,7 +174,13 @@ class EffectivenessMonitor {
     return mapping_ == Mapping::kWrongNumbers ? std::nullopt : slow_.wrong_spin();
   }
   [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
+  /// Stamp of the newest inertial sample that was taken.
+  [[nodiscard]] const std::optional<TimePoint>& newest_sample() const noexcept { return stamps_.newest(); }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
+  /// Samples whose stamp was older than one that turned out to be wrong: see StampGate.
+  [[nodiscard]] std::int64_t stamps_restarted() const noexcept { return stamps_.restarts(); }
+  /// Samples that repeat the rates of the one before: no measurement.
+  [[nodiscard]] std::int64_t samples_repeated() const noexcept { return repeated_; }
   [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
   /// How often the motion fitted best what no rotor does in flight: a gain of one that had lost nothing.
   [[nodiscard]] std::int64_t impossible_gains() const noexcept { return impossible_gains_; }
@@ -186,6 +195,11 @@ class EffectivenessMonitor {
   };
   static constexpr std::size_t kWaiting = 64;
 
+  [[nodiscard]] bool repeats(TimePoint time, const std::array<double, 3>& accel_m_s2,
+                             const std::array<double, 3>& gyro_rad_s) noexcept;
+  void start_over(TimePoint time) noexcept;
+  void note_lateness(TimePoint report) noexcept;
+  [[nodiscard]] bool come_too_late() const noexcept;
   std::optional<LossEvent> process(TimePoint now) noexcept;
   std::optional<LossEvent> step(const Inertial& sample, TimePoint now) noexcept;
   [[nodiscard]] Muted reason(const Inertial& sample) noexcept;
@@ -238,7 +252,7 @@ class EffectivenessMonitor {
   std::array<Inertial, kWaiting> waiting_{};
   std::size_t waiting_first_ = 0;
   std::size_t waiting_count_ = 0;
-  std::optional<TimePoint> last_imu_;    ///< as stamped
+  StampGate stamps_;
   std::optional<TimePoint> last_moved_;  ///< less the delay
   std::optional<TimePoint> last_processed_;
   TimePoint last_stamp_{};  ///< of the same sample
@@ -269,6 +283,13 @@ class EffectivenessMonitor {
   std::int64_t times_gone_back_ = 0;
   std::int64_t dropped_ = 0;
   std::int64_t impossible_gains_ = 0;
+  std::int64_t repeated_ = 0;
+  std::array<double, 3> gyro_before_{};
+  std::array<double, 3> accel_before_{};
+  TimePoint gyro_changed_{};  ///< when a sample last differed from the one before
+  TimePoint accel_changed_{};
+  std::array<double, 3> gyro_watched_{};  ///< of the sample before, as it was watched for pushes
+  double lateness_s_ = 0.0;               ///< of the reports, on arrival, against the inertial stamps
   // Small ones together: no padding between the others.
   SpeedSource source_ = SpeedSource::kNone;
   bool needs_start_ = false;
