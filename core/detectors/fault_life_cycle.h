@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "core/time/time.h"
@@ -14,7 +15,7 @@ struct FaultLifeCycleParams {
 };
 
 /// Turns a test ratio (alarm at 1) into the life of a fault: raised, updated, cleared with hysteresis in
-/// value and in time, or latched.
+/// value and in time, or latched. Should the time go back, as after a stamp of the future, it counts from the new one.
 class FaultLifeCycle {
  public:
   enum class Transition { kNone, kRaise, kUpdate, kClear };
@@ -29,6 +30,8 @@ class FaultLifeCycle {
       below_since_.reset();
       return Transition::kRaise;
     }
+    published_at_ = std::min(published_at_, now);
+    if (below_since_) below_since_ = std::min(*below_since_, now);
     if (!(test_ratio < params_.clear_ratio)) {
       below_since_.reset();
     } else if (!below_since_) {

@@ -61,12 +61,10 @@ double FlightPhase::thrust_m_s2() const noexcept {
 }
 
 void FlightPhase::note_thrust(TimePoint time, Source source, double sum_speed2) noexcept {
-  auto& last = last_thrust_[source];
-  if (last && time < *last) {
+  if (thrust_stamps_[source].judge(time) == StampGate::Stamp::kOlder) {
     ++times_gone_back_;
     return;
   }
-  last = time;
   sum_speed2_[source] = sum_speed2;
 }
 
@@ -107,8 +105,9 @@ void FlightPhase::on_report(TimePoint time, LandedReport landed, double climb_m_
 
 void FlightPhase::choose_source(TimePoint now) noexcept {
   const auto age_s = [&](Source source) {
-    return last_thrust_[source] ? to_seconds(now - *last_thrust_[source])
-                                : std::numeric_limits<double>::infinity();
+    const auto& newest = thrust_stamps_[source].newest();
+    // Ahead by as much is no better than behind: the stamp is wrong, and what it says will soon be old.
+    return newest ? std::abs(to_seconds(now - *newest)) : std::numeric_limits<double>::infinity();
   };
   const Source before = source_;
   source_ = age_s(kSpeeds) <= kThrustFresh_s || age_s(kSpeeds) <= age_s(kCommands) ? kSpeeds : kCommands;
@@ -272,14 +271,16 @@ void FlightPhase::on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2
   for (std::size_t i = 0; i < 3; ++i) {
     if (!std::isfinite(accel_m_s2[i]) || !std::isfinite(gyro_rad_s[i])) return;
   }
-  if (has_time_ && time <= now_) {
+  const StampGate::Stamp stamp = stamps_.judge(time);
+  if (stamp == StampGate::Stamp::kSame || stamp == StampGate::Stamp::kOlder) {
     ++times_gone_back_;
     return;
   }
-  const double since_last_s = has_time_ ? to_seconds(time - now_) : 0.0;
+  const bool is_restart = stamp == StampGate::Stamp::kRestart;
+  const double since_last_s = has_time_ && !is_restart ? to_seconds(time - now_) : 0.0;
   const double dt_s = std::min(since_last_s, kLongestStep_s);
   now_ = time;
-  if (!has_time_) since_ = time;
+  if (!has_time_ || since_ > time) since_ = time;
   has_time_ = true;
   const bool had_thrust = has_thrust_ && since_last_s <= kThrustUnknown_s;
   choose_source(time);

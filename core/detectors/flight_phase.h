@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "core/time/stamp_gate.h"
 #include "core/time/time.h"
 #include "core/vehicle/multirotor.h"
 
@@ -61,7 +62,8 @@ class FlightPhase {
  public:
   explicit FlightPhase(const Multirotor& vehicle) noexcept;
 
-  /// Body frame FRD. Times must not go back; one that does is ignored and counted.
+  /// Body frame FRD. Times must not go back; one that does is ignored and counted, unless StampGate finds that the newest
+  /// was wrong: then the phase goes on from there as after a gap. So it is with each source of the thrust.
   void on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2,
               const std::array<double, 3>& gyro_rad_s) noexcept;
   /// NaN = this rotor did not report.
@@ -79,6 +81,10 @@ class FlightPhase {
   /// c of (3) for the source in use. m/s² per (rad/s)².
   [[nodiscard]] double thrust_scale() const noexcept { return scale_[source_].value; }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
+  /// How often the newest stamp turned out to have been wrong.
+  [[nodiscard]] std::int64_t restarts() const noexcept {
+    return stamps_.restarts() + thrust_stamps_[kSpeeds].restarts() + thrust_stamps_[kCommands].restarts();
+  }
 
  private:
   // A first-order low-pass that starts at its first input.
@@ -130,13 +136,14 @@ class FlightPhase {
   Multirotor vehicle_;
   Phase phase_ = Phase::kUnknown;
   TimePoint since_{};
+  StampGate stamps_;
   TimePoint now_{};
   bool has_time_ = false;
   std::int64_t times_gone_back_ = 0;
 
   std::array<Scale, 2> scale_{};
   std::array<double, 2> sum_speed2_{};
-  std::array<std::optional<TimePoint>, 2> last_thrust_{};
+  std::array<StampGate, 2> thrust_stamps_{};
   std::array<double, kMaxRotors> last_speed_rad_s_{};
   Source source_ = kSpeeds;
   bool has_thrust_ = false;

@@ -111,7 +111,8 @@ void ActuatorService::on_imu(const imu_t& message) {
   for (std::size_t i = 0; i < kAxes; ++i) {
     if (monitor_.axes()[i].transition != Transition::kNone) report_axis(i, monitor_.axes()[i]);
   }
-  if (state_published_ && sample.time - *state_published_ < config_.state_period) return;
+  const bool is_later = state_published_ && sample.time >= *state_published_;
+  if (is_later && sample.time - *state_published_ < config_.state_period) return;
   state_published_ = sample.time;
   publish_state();
 }
@@ -208,6 +209,7 @@ rt::DetectorReport ActuatorService::report() const {
                                                evidence_of_axis(axis, monitor_.axis_states()[i], i)));
   }
   node_.counters()["samples_refused"] = monitor_.refused();
+  node_.counters()["times_restarted"] = monitor_.restarts();
   node_.counters()["attitudes_refused"] = monitor_.refused_attitudes();
   node_.counters()["speeds_refused"] = monitor_.rotor_input().refused_speeds();
   node_.counters()["messages_refused"] = monitor_.rotor_input().refused_messages();

@@ -57,6 +57,10 @@ std::string text_of(Muted muted, Phase phase, std::size_t rotor) {
       return "pushed from the side: not by a rotor";
     case Muted::kTooSlow:
       return "inertial data come less than 50 times a second";
+    case Muted::kFrozen:
+      return "the inertial unit repeats itself";
+    case Muted::kSpeedsLate:
+      return "without commands, rotor speeds come too seldom or too late";
     case Muted::kNoSpeeds:
       return "neither rotor speeds nor commands";
     case Muted::kDelayUnknown:
@@ -188,10 +192,10 @@ void EffectivenessService::on_imu(const imu_t& message) {
   if (message.sensor_id != config_.imu_sensor_id) return;
   const TimePoint time = from_us(message.header.time_us);
   const Phase phase = phase_.advance_to(time).phase();
-  last_imu_ = time;
   const std::array accel{message.accel_m_s2[0], message.accel_m_s2[1], message.accel_m_s2[2]};
   const std::array gyro{message.gyro_rad_s[0], message.gyro_rad_s[1], message.gyro_rad_s[2]};
   handle(monitor_.on_imu(time, accel, gyro, phase));
+  last_imu_ = monitor_.newest_sample();
   note_source();
   check_description(time);
   if (phase == Phase::kInFlight) estimate(time, message);
@@ -335,9 +339,12 @@ rt::DetectorReport EffectivenessService::report() {
          rt::evidence("effectiveness_since_take_off", monitor_.slow().effectiveness(i), "1")}));
   }
   node_.counters()["samples_refused"] = monitor_.times_gone_back() + monitor_.samples_dropped();
+  node_.counters()["samples_repeated"] = monitor_.samples_repeated();
+  node_.counters()["stamps_restarted"] = monitor_.stamps_restarted();
   node_.counters()["speeds_refused"] = monitor_.speeds().refused_speeds();
   node_.counters()["messages_refused"] = monitor_.speeds().refused_messages();
-  node_.counters()["unexplained_disturbances"] = monitor_.test().unexplained_disturbances();
+  node_.counters()["unexplained_disturbances"] =
+      monitor_.test().unexplained_disturbances() + monitor_.impossible_gains();
   return report;
 }
 

@@ -88,6 +88,27 @@ void faulty(std::size_t first, std::size_t flights, FaultKind kind, double magni
   }
 }
 
+// Each line: number, vehicle, manoeuvre, rotor, loss, whether it was found, then rotor, ms since the return, k of the first
+// verdict after it; dashes without one.
+void returning(std::size_t first, std::size_t flights, double loss, Telemetry telemetry) {
+  for (std::size_t n = first; n < first + flights; ++n) {
+    EffectivenessFlight flight = draw(n, FaultKind::kPartialLoss, loss, true, telemetry);
+    flight.fault->end_s = flight.fault->onset_s + 4.0;
+    flight.give_up_s = 8.0;
+    flight.duration_s = 40.0;
+    auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+    const auto is_before = [&flight](const Said& said) { return said.time_s < flight.fault->end_s; };
+    const bool is_found = !outcome.ours.empty() && is_before(outcome.ours.front());
+    std::erase_if(outcome.ours, is_before);
+    std::printf("%zu %s %s %zu %.2f %d", n, kVehicles[n % kVehicles.size()],
+                kManoeuvreNames[n / kVehicles.size() % kManoeuvres.size()], flight.fault->rotor, loss,
+                is_found ? 1 : 0);
+    say(outcome.ours, flight.fault->end_s);
+    std::printf("\n");
+    std::fflush(stdout);
+  }
+}
+
 // Each line: number, vehicle, manoeuvre, rotor, excess, then rotor, s since lift-off or onset, k and kind of the first
 // alarm; dashes without one. onset_s 0: a wrong propeller was mounted on the ground.
 void over_effective(std::size_t first, std::size_t flights, double excess, double onset_s, double give_up_s,
@@ -174,6 +195,8 @@ int main(int argc, char** argv) {
     faulty(number(1), number(2), FaultKind::kPropellerLost, 1.0, telemetry);
   } else if (args.size() == 4 && args[0] == "partial") {
     faulty(number(1), number(2), FaultKind::kPartialLoss, std::stod(args[3]), telemetry);
+  } else if (args.size() == 4 && args[0] == "returns") {
+    returning(number(1), number(2), std::stod(args[3]), telemetry);
   } else if (args.size() == 6 && args[0] == "over") {
     over_effective(number(1), number(2), std::stod(args[3]), std::stod(args[4]), std::stod(args[5]),
                    telemetry);
@@ -184,8 +207,8 @@ int main(int argc, char** argv) {
   } else {
     std::fprintf(stderr,
                  "usage: effectiveness_evidence [--without-telemetry] lost FIRST N | partial FIRST N LOSS | "
-                 "over FIRST N EXCESS "
-                 "ONSET GIVE_UP | spin FIRST N SECONDS | healthy FIRST N CYCLES SECONDS\n");
+                 "returns FIRST N LOSS | over FIRST N EXCESS ONSET GIVE_UP | "
+                 "spin FIRST N SECONDS | healthy FIRST N CYCLES SECONDS\n");
     return 64;
   }
   return 0;

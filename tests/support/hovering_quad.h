@@ -50,12 +50,18 @@ class HoveringQuad {
         gives[axis] += effectiveness[i] * matrix_.per_speed2[kRows[axis]][i] * speed_rad_s * speed_rad_s;
       }
     }
-    for (std::size_t axis = 0; axis < 2; ++axis) rate_rad_s_[axis] += step_s * gives[axis];
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      turning_rad_s2_[axis] = gives[axis];
+      rate_rad_s_[axis] += step_s * gives[axis];
+    }
     vertical_m_s2_ = gives[2];
   }
 
   /// White noise of this standard deviation.
   double noise(double sigma) { return sigma * normal_(random_); }
+
+  /// Roll and pitch acceleration in the step.
+  [[nodiscard]] const std::array<double, 2>& turning_rad_s2() const { return turning_rad_s2_; }
 
   /// What the sensors measure after a step, with their noise: specific force along z; rates.
   double measured_vertical_m_s2() { return vertical_m_s2_ + noise(0.5); }
@@ -82,6 +88,7 @@ class HoveringQuad {
   std::array<double, 4> wander_{};
   std::array<double, 2> angle_rad_{};
   std::array<double, 2> rate_rad_s_{};
+  std::array<double, 2> turning_rad_s2_{};
   std::mt19937 random_;
   std::normal_distribution<> normal_;
 };

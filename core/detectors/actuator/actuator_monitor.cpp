@@ -111,7 +111,9 @@ void ActuatorMonitor::pause(NotJudged reason) noexcept {
 }
 
 void ActuatorMonitor::on_clock(TimePoint now) noexcept {
-  if (has_time_ && now - now_ > kSilent && reason_ != NotJudged::kNoInput) pause(NotJudged::kNoInput);
+  // A newest sample of the future tells no more than silence does.
+  const bool is_silent = has_time_ && (now - now_ > kSilent || now_ - now > kSilent);
+  if (is_silent && reason_ != NotJudged::kNoInput) pause(NotJudged::kNoInput);
 }
 
 DetectorState ActuatorMonitor::state() const noexcept {
@@ -147,14 +149,17 @@ UpdateStatus ActuatorMonitor::on_imu(const MonitorSample& sample, Phase phase) n
     ++refused_;
     return UpdateStatus::kNotFinite;
   }
-  if (has_time_ && sample.time <= now_) {
+  const StampGate::Stamp stamp = stamps_.judge(sample.time);
+  if (stamp == StampGate::Stamp::kSame || stamp == StampGate::Stamp::kOlder) {
     ++refused_;
     return UpdateStatus::kTimeBackward;
   }
-  const double dt_s = has_time_ ? to_seconds(sample.time - now_) : 0.0;
+  const bool is_restart = stamp == StampGate::Stamp::kRestart;
+  const double dt_s = has_time_ && !is_restart ? to_seconds(sample.time - now_) : 0.0;
   now_ = sample.time;
   has_time_ = true;
-  if (dt_s > kLongestStep_s) pause(NotJudged::kNoInput);
+  if (is_restart && last_raised_ > now_) last_raised_.reset();
+  if (is_restart || dt_s > kLongestStep_s) pause(NotJudged::kNoInput);
   const double step_s = std::min(dt_s, kLongestStep_s);
   thrust_.advance(now_, step_s);
   if (!thrust_.is_known() || phase != Phase::kInFlight) {

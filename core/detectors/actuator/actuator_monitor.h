@@ -13,6 +13,7 @@
 #include "core/detectors/detector_state.h"
 #include "core/detectors/flight_phase.h"
 #include "core/estimators/actuator/multi_stage_observer.h"
+#include "core/time/stamp_gate.h"
 
 namespace airworthy::actuator {
 
@@ -128,7 +129,7 @@ class ActuatorMonitor {
   void on_attitude(double roll_rad, double pitch_rad, double yaw_rad) noexcept;
   /// Positive up; NaN = not known: not fused.
   void on_climb(double climb_m_s) noexcept;
-  /// Estimates and judges. kTimeBackward, kNotFinite: nothing happened.
+  /// Estimates and judges. kTimeBackward (by StampGate), kNotFinite: nothing happened.
   UpdateStatus on_imu(const MonitorSample& sample, Phase phase) noexcept;
   /// Silence of the inertial unit, judged on the gateway's clock.
   void on_clock(TimePoint now) noexcept;
@@ -145,6 +146,8 @@ class ActuatorMonitor {
   /// Inertial samples: not finite, or not newer than the one before.
   [[nodiscard]] std::int64_t refused() const noexcept { return refused_; }
   [[nodiscard]] std::int64_t refused_attitudes() const noexcept { return refused_attitudes_; }
+  /// How often the newest inertial stamp turned out to have been wrong.
+  [[nodiscard]] std::int64_t restarts() const noexcept { return stamps_.restarts(); }
   [[nodiscard]] const RotorThrust& rotor_input() const noexcept { return thrust_; }
 
  private:
@@ -181,6 +184,7 @@ class ActuatorMonitor {
   std::array<std::optional<AxisObserver>, kAxes> axis_observers_;
   RotorObserver::Innovation innovation_;
 
+  StampGate stamps_;
   TimePoint now_{};
   double flown_s_ = 0.0;
   double thrust_ratio_ = 1.0;

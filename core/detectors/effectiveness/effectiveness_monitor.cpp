@@ -19,7 +19,12 @@ constexpr double kVarianceTime_s = 2.0;
 constexpr double kLeastVarianceRatio = 0.1;  // of the first guess
 constexpr double kMostVarianceRatio = 1000.0;
 constexpr double kMeanTime_s = 0.5;
-constexpr double kFirstDisturbance = 0.5;  // standard deviation at first, in shares of one rotor
+constexpr double kMostRate_rad_s = 200.0;      // that a gyroscope measures ...
+constexpr double kMostForce_m_s2 = 2000.0;     // ... and an accelerometer: more is damage on the way
+constexpr double kMostLateness_s = 0.25;       // a rotor whose reports are later is a silent one
+constexpr double kLatenessShare = 0.05;        // of the newest report in the mean
+constexpr double kMostExtrapolated_s = 0.008;  // beyond the newest report, without commands
+constexpr double kFirstDisturbance = 0.5;      // standard deviation at first, in shares of one rotor
 constexpr double kTiltInterval_s = 0.05;
 constexpr double kArrivalError = 0.5;  // of a step, standard deviation of stamps of arrival
 constexpr double kMappingPeriod_s = 1.0;
@@ -40,6 +45,7 @@ constexpr double kLeastRate_Hz = 50.0;  // below, usual gaps exceed what the fil
 constexpr Duration kLeastAge{4'000};    // of the evidence: a blow shows within a sample, a loss builds up
 constexpr double kSurelyPartial = 0.5;  // effectiveness that no lost propeller shows ...
 constexpr Duration kEarliestPartial{15'000};  // ... after so long
+constexpr double kLeastLeft = 0.1;            // of a rotor that may yet come back
 constexpr double kCautious = 2.0;             // times the threshold near the ground
 
 std::array<LossRange<double>, kLossRanges> ranges_of(const EffectivenessParams& params) {
@@ -66,6 +72,14 @@ SlowEvidenceParams slow_params_of(const EffectivenessParams& params) {
   result.gain_ratio = params.noise.gain_error_ratio;
   result.least_excess_ratio = params.least_loss_ratio;
   return result;
+}
+
+bool is_measurable(const std::array<double, 3>& accel_m_s2, const std::array<double, 3>& gyro_rad_s) {
+  for (std::size_t i = 0; i < 3; ++i) {  // not for what is no number either
+    if (!(std::abs(gyro_rad_s[i]) <= kMostRate_rad_s && std::abs(accel_m_s2[i]) <= kMostForce_m_s2))
+      return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -132,17 +146,17 @@ double EffectivenessMonitor::accel_sigma() const noexcept { return std::sqrt(acc
 std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2,
                                                       const std::array<double, 3>& gyro_rad_s,
                                                       Phase phase) noexcept {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!std::isfinite(accel_m_s2[i]) || !std::isfinite(gyro_rad_s[i])) {
-      ++dropped_;
-      return std::nullopt;
-    }
+  if (!is_measurable(accel_m_s2, gyro_rad_s)) {
+    ++dropped_;
+    return std::nullopt;
   }
-  if (last_imu_ && time <= *last_imu_) {
+  const StampGate::Stamp stamp = stamps_.judge(time);
+  if (stamp == StampGate::Stamp::kSame || stamp == StampGate::Stamp::kOlder) {
     ++times_gone_back_;
     return std::nullopt;
   }
-  last_imu_ = time;
+  if (stamp == StampGate::Stamp::kRestart) start_over(time);
+  if (repeats(time, accel_m_s2, gyro_rad_s)) return process(time);
   // From here on, times are those of the rotor speeds.
   const TimePoint moved = time - inertial_delay_;
   if (params_.learns_inertial_delay)
@@ -162,12 +176,59 @@ std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std:
   return process(time);
 }
 
+// A sensor has noise: what is the same to the last digit was not measured anew.
+bool EffectivenessMonitor::repeats(TimePoint time, const std::array<double, 3>& accel_m_s2,
+                                   const std::array<double, 3>& gyro_rad_s) noexcept {
+  const bool is_same_rate = gyro_rad_s == gyro_before_;
+  const bool is_same_force = accel_m_s2 == accel_before_;
+  gyro_before_ = gyro_rad_s;
+  accel_before_ = accel_m_s2;
+  if (!is_same_rate) gyro_changed_ = time;
+  if (!is_same_force) accel_changed_ = time;
+  const TimePoint changed = std::min(gyro_changed_, accel_changed_);
+  const bool is_frozen = to_seconds(time - changed) > longest_step_s();
+  if (is_same_rate) ++repeated_;
+  if (is_frozen && muted_ != Muted::kRotorLost) muted_ = Muted::kFrozen;
+  return is_same_rate || is_frozen;
+}
+
+/// The stamps so far were wrong.
+void EffectivenessMonitor::start_over(TimePoint time) noexcept {
+  last_moved_.reset();
+  last_processed_.reset();
+  waiting_count_ = 0;
+  delayed_count_ = 0;
+  delay_added_.reset();
+  delay_.interrupt();
+  for (std::optional<TimePoint>* since : {&in_flight_since_, &source_since_, &struck_}) {
+    if (*since && **since > time) *since = time;
+  }
+  gyro_changed_ = accel_changed_ = time;
+  needs_start_ = true;
+}
+
+// Reports keep the stamp of the measurement however long they took: until the next one comes, nobody is silent.
+void EffectivenessMonitor::note_lateness(TimePoint report) noexcept {
+  if (!stamps_.newest()) return;
+  const double late_s =
+      std::clamp(to_seconds(*stamps_.newest() - inertial_delay_ - report), 0.0, kMostLateness_s);
+  lateness_s_ += kLatenessShare * (late_s - lateness_s_);
+}
+
+bool EffectivenessMonitor::come_too_late() const noexcept {
+  if (source_ != SpeedSource::kTelemetry) return false;
+  const double behind_s =
+      speeds_.report_interval_s() + lateness_s_ + to_seconds(params_.speeds.telemetry_latency);
+  return behind_s > to_seconds(params_.most_wait) + kMostExtrapolated_s;
+}
+
 void EffectivenessMonitor::on_report(LandedReport report) noexcept {
   reported_in_air_ = report == LandedReport::kInAir;
 }
 
 std::optional<LossEvent> EffectivenessMonitor::on_speeds(TimePoint time,
                                                          std::span<const double> speed_rad_s) noexcept {
+  note_lateness(time);
   speeds_.on_speed(time, speed_rad_s);
   slow_.on_speeds(time, speed_rad_s);
   return process(time);
@@ -188,7 +249,7 @@ std::optional<LossEvent> EffectivenessMonitor::process(TimePoint now) noexcept {
     event = step(sample, now);
     const auto excess = watch_slowly(sample);
     if (excess && (excess->is_first || excess->is_over)) {
-      effectiveness_[excess->rotor] = std::max(0.0, excess->effectiveness);
+      set_effectiveness(excess->rotor, excess->effectiveness);
       needs_start_ = true;
     }
     // Never both: what the fast test has found is believed at once, and the slow evidence starts over.
@@ -205,8 +266,18 @@ void EffectivenessMonitor::watch_input(const Inertial& sample, double dt_s) noex
   for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i)
     lift_m_s2 -= params_.effectiveness.per_speed2[kVerticalRow][i] * mean_speed2_[i];
   hardly_lifts_s_ = lift_m_s2 < kLeastLift * kGravity_m_s2 ? hardly_lifts_s_ + dt_s : 0.0;
+  // A body that begins to turn pushes the accelerometer beside its centre of mass.
+  std::array<double, 2> turning{};
+  if (dt_s > 0.0) {
+    const auto& arm = params_.vehicle.imu_position_m;
+    const auto& w = sample.gyro_rad_s;
+    std::array<double, 3> change{};
+    for (std::size_t k = 0; k < 3; ++k) change[k] = (w[k] - gyro_watched_[k]) / dt_s;
+    turning = {change[1] * arm[2] - change[2] * arm[1], change[2] * arm[0] - change[0] * arm[2]};
+  }
+  gyro_watched_ = sample.gyro_rad_s;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    if (lateral_[axis].step(sample.accel_m_s2[axis], dt_s)) struck_ = sample.time;
+    if (lateral_[axis].step(sample.accel_m_s2[axis] - turning[axis], dt_s)) struck_ = sample.time;
   }
 }
 
@@ -267,7 +338,8 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
   if (sample.phase != Phase::kInFlight && !may_land) {
     in_flight_since_.reset();
     slow_.end_flight();
-    for (double& believed : effectiveness_) believed = std::min(believed, 1.0);  // it may have been changed
+    for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i)
+      set_effectiveness(i, std::min(effectiveness_[i], 1.0));  // it may have been changed
   }
   if (sample.phase != Phase::kInFlight && !cautious_) return Muted::kPhase;
   if (mean_step_s_ > 1.0 / kLeastRate_Hz) return Muted::kTooSlow;
@@ -280,6 +352,7 @@ Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
     muted_rotor_ = i;
     return Muted::kTelemetry;
   }
+  if (come_too_late()) return Muted::kSpeedsLate;
   if (!in_flight_since_) in_flight_since_ = sample.time;
   if (params_.learns_inertial_delay && !delay_is_known_) return Muted::kDelayUnknown;
   if (mapping_ == Mapping::kWrongNumbers) return Muted::kRotorMapping;
@@ -341,6 +414,10 @@ void EffectivenessMonitor::start(const Inertial& sample) noexcept {
   const double sigma = kFirstDisturbance * authority_[2];
   vertical_.start(sigma * sigma);
   mean_vertical_m_s2_ = -kGravity_m_s2;
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    const double speed = speeds_.speed(i);
+    usual_speed2_[i] = speed * speed;
+  }
   test_.reset();
 }
 
@@ -365,10 +442,11 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   std::array<double, 3> u{};
   std::array<double, 3> timing_variance{};
   std::array<double, 3> gap_variance{};
+  std::array<double, 3> rotor_variance{};
   // A stamp of arrival says when within a step: what turns so fast was measured elsewhere by so much.
   const double stamp_error_s = params_.learns_inertial_delay ? kArrivalError * mean_step_s_ : 0.0;
   const double timing_error_s =
-      (source_ == SpeedSource::kCommands ? unheard_timing_error_s_ : timing_error_s_) + stamp_error_s;
+      (speeds_.is_well_reported() ? timing_error_s_ : unheard_timing_error_s_) + stamp_error_s;
   double lift_change = 0.0;  // of what the rotors give, each second
   double speed_sum = 0.0;
   for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
@@ -386,7 +464,11 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     const std::array b{effectiveness_[i] * B[kRollRow][i], effectiveness_[i] * B[kPitchRow][i],
                        effectiveness_[i] * vertical_at_imu_[i]};
     motion.contribution[i] = {b[0] * mean, b[1] * mean, b[2] * now};
+    // What it usually gives is in the disturbance already.
+    usual_speed2_[i] += dt_s / (kMeanTime_s + dt_s) * (speed * speed - usual_speed2_[i]);
+    const double unusual = noise.rotor_error_ratio * (speed * speed - usual_speed2_[i]);
     for (std::size_t axis = 0; axis < 3; ++axis) {
+      rotor_variance[axis] += b[axis] * b[axis] * unusual * unusual;
       u[axis] += motion.contribution[i][axis];
       timing_variance[axis] += b[axis] * b[axis] * late * late;
       gap_variance[axis] += b[axis] * b[axis] * gap * gap;
@@ -406,7 +488,8 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
     const double variance = square(noise.acceleration_ratio * authority_[axis]) +
                             square(noise.gain_error_ratio * net) + timing_variance[axis];
     motion.rate[axis] = rate_[axis].step(dt_s, u[axis], sample.gyro_rad_s[axis],
-                                         {2.0 * (variance * noise.correlation_s + gap_variance[axis] * gap_s),
+                                         {2.0 * (variance * noise.correlation_s + gap_variance[axis] * gap_s +
+                                                 rotor_variance[axis] * noise.rotor_correlation_s),
                                           square(noise.disturbance_ratio_per_sqrt_s * authority_[axis])},
                                          gyro_variance_[axis].value + square(stamp_error_s * net));
     gyro_variance_[axis].step(motion.rate[axis].innovation, motion.rate[axis].variance, dt_s);
@@ -421,7 +504,8 @@ MotionSample<double> EffectivenessMonitor::innovate(const Inertial& sample, doub
   const double change = noise.gain_error_ratio * (u[2] - mean_vertical_m_s2_);
   const double density = square(noise.vertical_ratio_per_sqrt_s * authority_[2]) +
                          2.0 * (timing_variance[2] + square(change)) / noise.vertical_correlation_s +
-                         2.0 * gap_variance[2] / std::max(gap_s, noise.vertical_correlation_s);
+                         2.0 * gap_variance[2] / std::max(gap_s, noise.vertical_correlation_s) +
+                         2.0 * rotor_variance[2] / noise.rotor_correlation_s;
   motion.vertical =
       vertical_.step(dt_s, u[2] + (speed_ratio - 1.0) * vertical_.disturbance(), sample.accel_m_s2[2],
                      density, accel_variance_.value + square(stamp_error_s * lift_change));
@@ -493,7 +577,7 @@ std::optional<LossEvent> EffectivenessMonitor::judge(const Inertial& sample, dou
 }
 
 bool EffectivenessMonitor::is_silent(std::size_t rotor, TimePoint now) const noexcept {
-  return source_ != SpeedSource::kCommands && speeds_.is_overdue(rotor, now);
+  return source_ != SpeedSource::kCommands && speeds_.is_overdue(rotor, now - from_seconds(lateness_s_));
 }
 
 bool EffectivenessMonitor::is_any_silent(TimePoint now) const noexcept {
@@ -519,7 +603,14 @@ std::optional<LossEvent> EffectivenessMonitor::decide(const MotionSample<double>
   const Duration age = sample.time - finding->onset;
   if (age < kLeastAge) return std::nullopt;
   // A rotor that falls silent may stand still: that is for its next report to say. A gain of another looks like it.
-  if (is_silent(finding->rotor, now) || (finding->loss < 0.0 && is_any_silent(now))) return std::nullopt;
+  const bool is_return = finding->loss < 0.0;
+  if (is_silent(finding->rotor, now) || (is_return && is_any_silent(now))) return std::nullopt;
+  // No propeller grows in flight: what fits the gain of a rotor that had lost nothing is something else.
+  if (is_return && !has_lost(finding->rotor)) {
+    ++impossible_gains_;
+    test_.reset();
+    return std::nullopt;
+  }
   LossEvent event;
   event.rotor = finding->rotor;
   event.effectiveness = effectiveness_[event.rotor] * (1.0 - finding->loss);
@@ -562,9 +653,8 @@ std::optional<LossKind> EffectivenessMonitor::kind_of(const LossEvent& event) co
   const double dead = dead_ratio();
   const double believed = effectiveness_[event.rotor];
   const bool was_over = believed > 1.0 + dead;
-  const bool was_partial = believed < 1.0 - dead;
   if (event.probability > 0.5) return LossKind::kPropellerLost;
-  if (was_partial || event.effectiveness <= 1.0 - dead) return LossKind::kPartialLoss;
+  if (has_lost(event.rotor) || event.effectiveness <= 1.0 - dead) return LossKind::kPartialLoss;
   if (was_over || event.effectiveness > 1.0 + dead) return LossKind::kOverEffective;
   return std::nullopt;
 }
@@ -580,12 +670,22 @@ void EffectivenessMonitor::believe(const LossEvent& event, const Test::Finding& 
 
 void EffectivenessMonitor::follow(std::size_t rotor, double effectiveness,
                                   const Test::Finding& finding) noexcept {
-  effectiveness_[rotor] = std::max(0.0, effectiveness);
+  set_effectiveness(rotor, effectiveness);
   slow_.believe(rotor, effectiveness_[rotor]);
   for (std::size_t axis = 0; axis < 2; ++axis)
     rate_[axis].shift(finding.rate_shift[axis], finding.disturbance_shift[axis]);
   vertical_.shift(finding.disturbance_shift[2]);
   test_.reset();
+}
+
+void EffectivenessMonitor::set_effectiveness(std::size_t rotor, double effectiveness) noexcept {
+  effectiveness_[rotor] = std::max(0.0, effectiveness);
+  const double whole = (1.0 + dead_ratio()) / std::max(effectiveness_[rotor], kLeastLeft);
+  test_.may_return(rotor, has_lost(rotor) ? whole - 1.0 : 0.0);
+}
+
+bool EffectivenessMonitor::has_lost(std::size_t rotor) const noexcept {
+  return effectiveness_[rotor] < 1.0 - dead_ratio();
 }
 
 std::optional<SlowEvidence::Excess> EffectivenessMonitor::watch_slowly(const Inertial& sample) noexcept {

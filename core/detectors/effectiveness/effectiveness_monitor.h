@@ -16,10 +16,11 @@
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
 #include "core/estimators/effectiveness/rotor_speed_predictor.h"
 #include "core/estimators/effectiveness/stream_delay.h"
+#include "core/time/stamp_gate.h"
 
 namespace airworthy::effectiveness {
 
-/// A sudden great loss, a smaller one that shows later, and a sudden gain.
+/// A sudden great loss, a smaller one that shows later, and a gain: the return of what was lost.
 inline constexpr std::size_t kLossRanges = 3;
 
 /// How far the model may be wrong. Accelerations in shares of what one rotor gives in hover, so that the same
@@ -28,6 +29,8 @@ struct ModelNoise {
   double acceleration_ratio = 0.04;  ///< always there, correlated over `correlation_s`
   double gain_error_ratio = 0.2;     ///< of the acceleration that the rotors give at this moment
   double correlation_s = 0.01;
+  double rotor_error_ratio = 0.1;  ///< of what each rotor's thrust differs from usual: arms, propellers, air
+  double rotor_correlation_s = 0.05;
   double vertical_correlation_s = 0.03;
   double lag_error_ratio = 0.1;  ///< of the motors' time constant ...
   double latency_error_s =
@@ -68,9 +71,11 @@ enum class Muted : std::uint8_t {
   kNoThrust,        ///< the rotors hardly lift: what one of them lost would not show
   kStruck,          ///< pushed from the side, as no rotor can
   kTooSlow,         ///< inertial data come less often than kLeastRate_Hz
+  kFrozen,          ///< the inertial unit repeats itself: nothing is measured
   kNoSpeeds,        ///< neither reports nor commands
   kDelayUnknown,    ///< not yet known how much later than the speeds the inertial data come
   kTelemetry,       ///< of one rotor implausible, frozen or missing
+  kSpeedsLate,      ///< without commands, reports come too seldom or too late
   kMappingUnknown,  ///< nothing has yet shown that the rotors are numbered as described
   kRotorMapping,    ///< the vehicle moves as if the rotors were numbered otherwise
   kRotorLost,       ///< what is left cannot be judged
@@ -169,8 +174,16 @@ class EffectivenessMonitor {
     return mapping_ == Mapping::kWrongNumbers ? std::nullopt : slow_.wrong_spin();
   }
   [[nodiscard]] double judged_s() const noexcept { return judged_s_; }
+  /// Stamp of the newest inertial sample that was taken.
+  [[nodiscard]] const std::optional<TimePoint>& newest_sample() const noexcept { return stamps_.newest(); }
   [[nodiscard]] std::int64_t times_gone_back() const noexcept { return times_gone_back_; }
+  /// Samples whose stamp was older than one that turned out to be wrong: see StampGate.
+  [[nodiscard]] std::int64_t stamps_restarted() const noexcept { return stamps_.restarts(); }
+  /// Samples that repeat the rates of the one before: no measurement.
+  [[nodiscard]] std::int64_t samples_repeated() const noexcept { return repeated_; }
   [[nodiscard]] std::int64_t samples_dropped() const noexcept { return dropped_; }
+  /// How often the motion fitted best what no rotor does in flight: a gain of one that had lost nothing.
+  [[nodiscard]] std::int64_t impossible_gains() const noexcept { return impossible_gains_; }
 
  private:
   struct Inertial {
@@ -182,6 +195,11 @@ class EffectivenessMonitor {
   };
   static constexpr std::size_t kWaiting = 64;
 
+  [[nodiscard]] bool repeats(TimePoint time, const std::array<double, 3>& accel_m_s2,
+                             const std::array<double, 3>& gyro_rad_s) noexcept;
+  void start_over(TimePoint time) noexcept;
+  void note_lateness(TimePoint report) noexcept;
+  [[nodiscard]] bool come_too_late() const noexcept;
   std::optional<LossEvent> process(TimePoint now) noexcept;
   std::optional<LossEvent> step(const Inertial& sample, TimePoint now) noexcept;
   [[nodiscard]] Muted reason(const Inertial& sample) noexcept;
@@ -202,6 +220,9 @@ class EffectivenessMonitor {
   std::optional<LossEvent> decide(const MotionSample<double>& sample, TimePoint now) noexcept;
   /// Below it, effectiveness differs from 1 by nothing worth a word.
   [[nodiscard]] double dead_ratio() const noexcept;
+  /// Whether rotor i is believed to give less than that.
+  [[nodiscard]] bool has_lost(std::size_t rotor) const noexcept;
+  void set_effectiveness(std::size_t rotor, double effectiveness) noexcept;
   /// Nothing where the rotor is within the dead ratio, and nothing was said of it.
   [[nodiscard]] std::optional<LossKind> kind_of(const LossEvent& event) const noexcept;
   void believe(const LossEvent& event, const Test::Finding& finding) noexcept;
@@ -220,6 +241,7 @@ class EffectivenessMonitor {
   std::array<double, kMaxRotors> effectiveness_{};
   std::array<double, kMaxRotors> speed_before_{};
   std::array<double, kMaxRotors> mean_speed2_{};  ///< since the sample before
+  std::array<double, kMaxRotors> usual_speed2_{};
   std::array<std::array<double, 2>, kMaxRotors> inflow_per_rate_{};
   std::array<double, kMaxRotors> vertical_at_imu_{};
   double hover_speed_sum_ = 1.0;
@@ -230,7 +252,7 @@ class EffectivenessMonitor {
   std::array<Inertial, kWaiting> waiting_{};
   std::size_t waiting_first_ = 0;
   std::size_t waiting_count_ = 0;
-  std::optional<TimePoint> last_imu_;    ///< as stamped
+  StampGate stamps_;
   std::optional<TimePoint> last_moved_;  ///< less the delay
   std::optional<TimePoint> last_processed_;
   TimePoint last_stamp_{};  ///< of the same sample
@@ -260,6 +282,14 @@ class EffectivenessMonitor {
   double judged_s_ = 0.0;
   std::int64_t times_gone_back_ = 0;
   std::int64_t dropped_ = 0;
+  std::int64_t impossible_gains_ = 0;
+  std::int64_t repeated_ = 0;
+  std::array<double, 3> gyro_before_{};
+  std::array<double, 3> accel_before_{};
+  TimePoint gyro_changed_{};  ///< when a sample last differed from the one before
+  TimePoint accel_changed_{};
+  std::array<double, 3> gyro_watched_{};  ///< of the sample before, as it was watched for pushes
+  double lateness_s_ = 0.0;               ///< of the reports, on arrival, against the inertial stamps
   // Small ones together: no padding between the others.
   SpeedSource source_ = SpeedSource::kNone;
   bool needs_start_ = false;

@@ -37,6 +37,7 @@ struct RotorLossParams {
   Scalar margin = 8;                       ///< over the best hypothesis about another rotor, nats
   Scalar unexplained = 8;                  ///< what one rotor may leave unexplained, nats ...
   Scalar unexplained_ratio = Scalar(0.2);  ///< ... or as a share of all that is to be explained
+  Scalar fruitless_s = Scalar(0.5);        ///< a sum that has so little to say after so long starts anew
   Scalar varying_ratio = Scalar(0.5);  ///< of the evidence may come from changes of the rotor's speed alone
 };
 
@@ -52,11 +53,15 @@ template <class Scalar>
 /// Generalised likelihood ratio over "rotor i has lost the share s of its thrust since t₀".
 ///   Signature     hᵢ: what the innovations e would hold if s were 1 since t₀ (RateAxis, ForceAxis)
 ///   Ratio         aᵢ = Σ hᵢ·e/S, bᵢ = Σ hᵢ²/S over axes and samples since t₀;  ℓᵢ(s) = s·aᵢ − s²·bᵢ/2            (1)
-///   Size          ŝᵢ = aᵢ/bᵢ within the range of the bank, variance 1/bᵢ;  ℓᵢ = ℓᵢ(ŝᵢ)                        (2)
-///   Reset         t₀ ← now where ℓᵢ(s_least) ≤ 0, as in Page's cumulative sum                               (3)
+///   Size          ŝᵢ = aᵢ/bᵢ within the range of the bank, variance 1/bᵢ;  ℓᵢ = ℓᵢ(ŝᵢ); once i is named, from the range
+///                 with the greatest ℓᵢ                                                                    (2)
+///   Reset         t₀ ← now where ℓᵢ(s_least) ≤ 0, as in Page's cumulative sum; and where ℓᵢ is below the margin after
+///                 half a second: by then the disturbance has taken the place of what began at t₀, hᵢ has faded, and
+///                 a sum that goes on would be blind to what begins now                                      (3)
 ///   Something else  any acceleration of p, q and a_z at once since t₀:  ℓ₀ = Σ_axes a²/(2b)                     (4)
-///   Decision      ℓᵢ ≥ h, ℓᵢ − ℓⱼ ≥ margin for every other rotor j, and ℓ₀ − ℓᵢ within what is allowed; where i lost,
-///                 ℓⱼ − margin takes the place of ℓⱼ of a gain: no propeller grows in flight                       (5)
+///   Decision      ℓᵢ ≥ h, (ℓᵢ + πᵢ) − (ℓⱼ + πⱼ) ≥ margin for every other rotor j, and ℓ₀ − ℓᵢ within what is allowed.
+///                 π is −margin for a gain, for no propeller grows in flight; +margin for what was lost and comes
+///                 back, which is likelier than that another rotor loses something; 0 for a loss             (5)
 ///   Lasting       ℓ₀ − ℓᵢ ≥ −ℓᵢ/2: a loss is a lasting change, not the rotor's own ups and downs           (6)
 ///   Source        [Page1954], [Willsky1976]; derived in docs/equations/effectiveness.md
 ///   Deviations    t₀ by (3) instead of a search over all t₀: one sum for each rotor and range
@@ -84,6 +89,9 @@ class RotorLossTest {
 
   void reset() noexcept { windows_ = {}; }
 
+  /// Rotor i has lost something: a gain of up to this share of what is left gives it back.
+  void may_return(std::size_t rotor, Scalar most_share) noexcept { most_return_[rotor] = most_share; }
+
   void step(const MotionSample<Scalar, kMost>& sample) noexcept {
     for (std::size_t r = 0; r < kRanges; ++r) {
       for (std::size_t i = 0; i < n_; ++i) accumulate(windows_[r][i], sample, i, ranges_[r]);
@@ -100,7 +108,7 @@ class RotorLossTest {
       const bool decided = best.evidence >= params_.threshold &&
                            best.evidence - best.second >= params_.margin &&
                            best.unexplained <= allowed(best.evidence + best.unexplained) && lasts;
-      if (decided) return best;
+      if (decided) return sized(best);
     }
     return std::nullopt;
   }
@@ -117,22 +125,15 @@ class RotorLossTest {
     for (std::size_t r = 0; r < kRanges; ++r) {
       for (std::size_t i = 0; i < n_; ++i) {
         if (i == best.rotor) continue;
-        // No propeller grows in flight: as a rival of a loss, a gain starts behind by the margin.
-        const bool is_unlikely = ranges_[r].most < Scalar{0} && ranges_[range].most > Scalar{0};
         best.second =
-            std::max(best.second, windows_[r][i].evidence - (is_unlikely ? params_.margin : Scalar{0}));
+            std::max(best.second, windows_[r][i].evidence + prior_odds(r, i) - prior_odds(range, best.rotor));
       }
     }
     const Window& window = windows_[range][best.rotor];
-    best.loss = window.loss;
-    best.loss_variance = window.b > Scalar{0} ? Scalar{1} / window.b : Scalar{1};
+    best.second = std::max(best.second, Scalar{0});
     best.unexplained = window.everything - window.evidence;
     best.onset = window.onset;
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      best.rate_shift[axis] = window.loss * window.rate[axis].rate;
-      best.disturbance_shift[axis] = window.loss * window.rate[axis].disturbance;
-    }
-    best.disturbance_shift[2] = window.loss * window.vertical.disturbance;
+    read_size(window, best);
     return best;
   }
 
@@ -162,6 +163,34 @@ class RotorLossTest {
     Scalar everything = 0;  ///< ℓ₀
   };
 
+  /// Log of the odds before any evidence, against a first loss: a return is likelier, a gain less likely.
+  [[nodiscard]] Scalar prior_odds(std::size_t range, std::size_t rotor) const noexcept {
+    if (ranges_[range].most > Scalar{0}) return Scalar{0};
+    return -windows_[range][rotor].loss < most_return_[rotor] ? params_.margin : -params_.margin;
+  }
+
+  static void read_size(const Window& window, Finding& finding) noexcept {
+    finding.loss = window.loss;
+    finding.loss_variance = window.b > Scalar{0} ? Scalar{1} / window.b : Scalar{1};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      finding.rate_shift[axis] = window.loss * window.rate[axis].rate;
+      finding.disturbance_shift[axis] = window.loss * window.rate[axis].disturbance;
+    }
+    finding.disturbance_shift[2] = window.loss * window.vertical.disturbance;
+  }
+
+  /// A quick decision comes from a range that knows great losses alone: the size is read where most is explained.
+  [[nodiscard]] Finding sized(Finding finding) const noexcept {
+    Scalar most = finding.evidence;
+    for (std::size_t r = 0; r < kRanges; ++r) {
+      const Window& window = windows_[r][finding.rotor];
+      if (!(window.evidence > most) || (window.loss > Scalar{0}) != (finding.loss > Scalar{0})) continue;
+      most = window.evidence;
+      read_size(window, finding);
+    }
+    return finding;
+  }
+
   [[nodiscard]] Scalar allowed(Scalar everything) const noexcept {
     return std::max(params_.unexplained, params_.unexplained_ratio * everything);
   }
@@ -187,10 +216,10 @@ class RotorLossTest {
       window.free_a[axis] = keep * window.free_a[axis] + free * seen.innovation / seen.variance;
       window.free_b[axis] = keep * window.free_b[axis] + free * free / seen.variance;
     }
-    judge(window, range);
+    judge(window, range, sample.time);
   }
 
-  void judge(Window& window, const LossRange<Scalar>& range) noexcept {
+  void judge(Window& window, const LossRange<Scalar>& range, TimePoint now) noexcept {
     const auto ratio = [&window](Scalar s) { return s * window.a - s * s * window.b / Scalar{2}; };
     if (!(window.b > Scalar{0})) return;
     if (!(ratio(range.least) > Scalar{0})) {  // (3)
@@ -206,6 +235,11 @@ class RotorLossTest {
         window.everything +=
             window.free_a[axis] * window.free_a[axis] / (Scalar{2} * window.free_b[axis]);  // (4)
     }
+    const bool is_fruitless = to_seconds(now - window.onset) > params_.fruitless_s;
+    if (is_fruitless && window.evidence < params_.margin) {  // (3)
+      window = Window{};
+      return;
+    }
     const Scalar left = window.everything - window.evidence;
     if (window.everything > params_.threshold && left > Scalar{2} * allowed(window.everything)) {
       ++unexplained_;
@@ -217,6 +251,7 @@ class RotorLossTest {
   RotorLossParams<Scalar> params_;
   std::array<LossRange<Scalar>, kRanges> ranges_;
   std::array<std::array<Window, kMost>, kRanges> windows_{};
+  std::array<Scalar, kMost> most_return_{};
   std::int64_t unexplained_ = 0;
 };
 

@@ -187,6 +187,7 @@ void SlowEvidence::begin(const SlowSample& sample) noexcept {
     since_ = sample.time;
     age_s_ = 0.0;
     healthy_since_ = {};
+    excess_since_ = {};
     starts_over_ = false;
   } else {
     thrust_.resume(rate);
@@ -275,7 +276,12 @@ std::optional<SlowEvidence::Excess> SlowEvidence::accuse(const SlowSample& sampl
   const bool has_found = std::find(claim_.begin(), claim_.end(), Claim::kFound) != claim_.end();
   if (has_found || !sample.may_accuse) return std::nullopt;
   for (std::size_t i = 0; i < n_; ++i) {
-    if (!is_excess(i)) continue;
+    if (!is_excess(i)) {
+      excess_since_[i].reset();
+      continue;
+    }
+    if (!excess_since_[i]) excess_since_[i] = sample.time;
+    if (sample.time - *excess_since_[i] < kLasting) continue;
     claim_[i] = Claim::kFound;
     healthy_since_[i].reset();
     Excess excess = excess_of(i, sample);

@@ -36,8 +36,8 @@ struct SlowSample {
 
 /// What only shows over seconds to minutes: a rotor that has given more thrust than described since take-off, and
 /// rotors that turn the other way than described. It waits for telemetry in place of predicting the speeds.
-///   Excess   ℓᵢ of ThrustRegression at least h, kᵢ = believedᵢ·(1 + δᵢ) at least 1 + least_excess with δᵢ > 0, and margin
-///            before every other rotor, however that one differs; cleared when kᵢ + 2σ stays below 1 + ½·least_excess
+///   Excess   for kLasting: ℓᵢ of ThrustRegression at least h, kᵢ = believedᵢ·(1 + δᵢ) at least 1 + least_excess with
+///            δᵢ > 0, and margin before every other rotor, however that one differs; cleared when kᵢ + 2σ stays below 1 + ½·least_excess
 ///            for kClearAfter. One rotor at a time is accused here; what note() has told of others is followed too
 ///   Spin     a pattern of SpinRegression at least h before the one described; named if margin before all others
 ///   h        ln(hypotheses·looks per hour/false alarms per hour); sums fade within kMemory_s: a look is half of that
@@ -45,6 +45,8 @@ class SlowEvidence {
  public:
   static constexpr double kMemory_s = 180.0;
   static constexpr double kMargin = 8.0;  ///< nats, as of RotorLossTest
+  /// A wrong propeller stays what it is; what a steep descent does to the air passes.
+  static constexpr Duration kLasting{5'000'000};
   static constexpr Duration kClearAfter{10'000'000};
 
   struct Excess {
@@ -137,6 +139,7 @@ class SlowEvidence {
   bool is_running_ = false;
   std::array<Claim, kMaxRotors> claim_{};
   std::array<std::optional<TimePoint>, kMaxRotors> healthy_since_{};
+  std::array<std::optional<TimePoint>, kMaxRotors> excess_since_{};
   std::size_t followed_ = 0;  ///< the rotor of the last update
   std::optional<std::uint32_t> wrong_spin_;
   bool spin_is_named_ = false;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 namespace airworthy {
 
@@ -16,6 +17,7 @@ struct AxisInnovation {
 
 /// Adapts the variance of a measurement from its innovations, clipped so that a fault teaches little.
 ///   R ← R + Δt/T·(min(e², 9·S) − S),  R_min ≤ R ≤ R_max                                                 (1)
+/// What is no number teaches nothing.
 template <class Scalar>
 struct AdaptiveVariance {
   Scalar value = 1;
@@ -24,6 +26,7 @@ struct AdaptiveVariance {
   Scalar time_s = 2;
 
   void step(Scalar innovation, Scalar variance, Scalar dt_s) noexcept {
+    if (!std::isfinite(innovation) || !std::isfinite(variance)) return;
     const Scalar clipped = std::min(innovation * innovation, Scalar{9} * variance);
     value = std::clamp(value + dt_s / time_s * (clipped - variance), least, most);  // (1)
   }

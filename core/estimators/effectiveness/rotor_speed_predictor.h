@@ -41,7 +41,7 @@ enum class SpeedSource : std::uint8_t {
 ///   Without commands  ω = telemetry, linear between two, the newest held                                 (3)
 ///   Without telemetry (1) alone, with the last s, once no rotor has reported for 0.25 s. A rotor that is silent while
 ///               others report is not taken for one without telemetry: its motor may stand             (5)
-///   Gaps of (5) commands that come every T are not known between: a random walk of their own diffusion D, estimated from
+///   Gaps of (5), and where reports come more than 25 ms apart: commands that come every T are not known between: a random walk of their own diffusion D, estimated from
 ///               their changes, leaves σ² = s²·D·(T/6 + time since the newest)                          (6)
 ///   Symbols     τ → time_constant_s; t_c, t_t → latencies; s → scale: battery sag and command curve
 ///   Plausible   a reported speed is refused beyond 1.6 full speeds, or if it jumps by more than a third of
@@ -98,11 +98,11 @@ class RotorSpeedPredictor {
     return known;
   }
 
-  /// Moves to `time`, not before the last; false while no speed is known.
+  /// Moves to `time`; before the last or long after it starts anew. False while no speed is known.
   [[nodiscard]] bool advance(TimePoint time) noexcept {
     const SpeedSource source = source_at(time);
     if (source == SpeedSource::kNone) return false;
-    if (source_ == SpeedSource::kNone || time - now_ > kLongestStep || source != source_)
+    if (source_ == SpeedSource::kNone || time < now_ || time - now_ > kLongestStep || source != source_)
       restart(time, source);
     const Scalar dt_s = static_cast<Scalar>(to_seconds(time - now_));
     if (uses_commands()) {
@@ -131,14 +131,25 @@ class RotorSpeedPredictor {
   [[nodiscard]] bool uses_commands() const noexcept {
     return source_ == SpeedSource::kTelemetryAndCommands || source_ == SpeedSource::kCommands;
   }
-  /// σ of (6) now, rad/s; 0 unless the speeds come from commands alone.
+  /// Whether reports come often enough to correct what follows from the commands within their gaps.
+  [[nodiscard]] bool is_well_reported() const noexcept {
+    return source_ == SpeedSource::kTelemetry ||
+           (source_ == SpeedSource::kTelemetryAndCommands && report_interval_s() <= kOften_s);
+  }
+  /// σ of (6) now, rad/s; 0 unless the speeds follow from commands.
   [[nodiscard]] Scalar gap_sigma(std::size_t i) const noexcept {
-    if (source_ != SpeedSource::kCommands) return Scalar{0};
+    if (is_well_reported()) return Scalar{0};
     const Scalar beyond_s = static_cast<Scalar>(to_seconds(staleness()));
     return scale_[i] * std::sqrt(change_[i] * (command_interval_s_ / Scalar{6} + beyond_s));
   }
   /// T of (6).
   [[nodiscard]] Scalar command_interval_s() const noexcept { return command_interval_s_; }
+  /// Mean interval of the reports, of the rotor that reports most seldom; 0 before the second.
+  [[nodiscard]] Scalar report_interval_s() const noexcept {
+    Scalar most{0};
+    for (std::size_t i = 0; i < params_.rotor_count; ++i) most = std::max(most, report_[i].interval_s);
+    return most;
+  }
   /// Whether a report of rotor i should have come since the last one, by its own mean interval.
   [[nodiscard]] bool is_overdue(std::size_t i, TimePoint now) const noexcept {
     const Report& report = report_[i];
@@ -170,6 +181,7 @@ class RotorSpeedPredictor {
   static constexpr Scalar kChangeTime_s = Scalar(1);
   static constexpr Scalar kIntervalShare = Scalar(0.05);  // of the newest in its running mean
   static constexpr Scalar kOverdue = Scalar(2);           // intervals
+  static constexpr Scalar kOften_s = Scalar(0.025);       // the mean interval of reports
   static constexpr Duration kLongestStep{100'000};
   static constexpr Duration kJumpWithin{50'000};
   static constexpr Duration kMissingAfter{250'000};
@@ -361,7 +373,7 @@ class RotorSpeedPredictor {
   }
 
   void restart(TimePoint time, SpeedSource source) noexcept {
-    const bool goes_on = source_ != SpeedSource::kNone && time - now_ <= kLongestStep;
+    const bool goes_on = source_ != SpeedSource::kNone && time >= now_ && time - now_ <= kLongestStep;
     source_ = source;
     history_.size = history_.next = 0;
     if (source == SpeedSource::kCommands) {

@@ -51,6 +51,17 @@ TEST(FaultLifeCycle, UpdatesAtItsPeriod) {
   EXPECT_EQ(life.step(1.0, at(1.5)), Transition::kNone);
 }
 
+TEST(FaultLifeCycle, AStampOfTheFutureDelaysNeitherUpdateNorClearing) {
+  FaultLifeCycle life{{.clear_ratio = 0.1, .clear_after = from_seconds(5), .update_period = from_seconds(1)}};
+  EXPECT_EQ(life.step(1.0, at(0)), Transition::kRaise);
+  EXPECT_EQ(life.step(1.0, at(3600)), Transition::kUpdate);
+  EXPECT_EQ(life.step(1.0, at(1)), Transition::kNone);
+  EXPECT_EQ(life.step(1.0, at(2)), Transition::kUpdate);
+  EXPECT_EQ(life.step(0.0, at(3600)), Transition::kUpdate);
+  EXPECT_EQ(life.step(0.0, at(3)), Transition::kNone);
+  EXPECT_EQ(life.step(0.0, at(8)), Transition::kClear);
+}
+
 TEST(FaultLifeCycle, NotANumberNeitherRaisesNorClears) {
   FaultLifeCycle life{{.clear_ratio = 0.1, .clear_after = from_seconds(1)}};
   EXPECT_EQ(life.step(std::nan(""), at(0)), Transition::kNone);

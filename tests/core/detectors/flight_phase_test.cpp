@@ -222,6 +222,30 @@ TEST_F(FlightPhaseTest, NonsenseChangesNothing) {
   EXPECT_EQ(phase_.times_gone_back(), 1);
 }
 
+TEST_F(FlightPhaseTest, GoesOnAfterAnInertialStampOfTheFuture) {
+  take_off();
+  phase_.on_imu(now_ + std::chrono::hours{1}, {0.0, 0.0, -kG}, {0.0, 0.0, 0.0});
+  run(2.5, 1.0, 1.0);
+  EXPECT_EQ(phase_.restarts(), 1);
+  EXPECT_EQ(phase_.times_gone_back(), 9);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+  EXPECT_LE(phase_.since(), now_);
+  run(1.0, 0.05, 1.0);
+  EXPECT_EQ(phase_.phase(), Phase::kOnGround);
+}
+
+TEST_F(FlightPhaseTest, AThrustStampOfTheFutureIsNotBelievedForAnHour) {
+  take_off();
+  phase_.on_rotor_speeds(now_ + std::chrono::hours{1}, std::array{100.0, 100.0, 100.0, 100.0});
+  for (int i = 0; i < 250; ++i) {
+    run(0.01, 1.0, 1.0);
+    ASSERT_TRUE(phase_.phase() == Phase::kInFlight || phase_.phase() == Phase::kUnknown);
+  }
+  EXPECT_EQ(phase_.restarts(), 1);
+  EXPECT_EQ(phase_.phase(), Phase::kInFlight);
+  EXPECT_NEAR(phase_.thrust_m_s2(), kG, 0.1);
+}
+
 TEST_F(FlightPhaseTest, AShiftOfTimeChangesNothing) {
   Bench other;
   take_off();

@@ -236,6 +236,37 @@ TEST(ActuatorMonitor, AClockThatJumpsForwardStartsTheFlightAnewAndBlamesNobody) 
   EXPECT_EQ(flight.raised + flight.axis_raised, 0);
 }
 
+TEST(ActuatorMonitor, OneStampOfTheFutureCostsTenSamplesNotAnHour) {
+  Flight flight{4};
+  flight.fly(20);
+  const TimePoint future = flight.now() + std::chrono::hours{1};
+  EXPECT_EQ(flight.monitor.on_imu({future, flight.body.accel_m_s2, flight.body.gyro_rad_s}, Phase::kInFlight),
+            UpdateStatus::kFused);
+  flight.fly(9 * HoveringMultirotor::kStep_s);
+  EXPECT_EQ(flight.monitor.refused(), 9);
+  flight.fly(HoveringMultirotor::kStep_s);
+  EXPECT_EQ(flight.monitor.refused(), 9);
+  EXPECT_EQ(flight.monitor.restarts(), 1);
+  EXPECT_EQ(flight.monitor.time(), flight.now());
+  flight.fly(25);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+  EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+  flight.body.loss_ratio[1] = 0.6;
+  flight.fly(1);
+  EXPECT_EQ(flight.named, 1U);
+}
+
+TEST(ActuatorMonitor, AStampOfTheFutureAsTheLastIsSilence) {
+  Flight flight{4};
+  flight.fly(10);
+  const TimePoint future = flight.now() + std::chrono::hours{1};
+  flight.monitor.on_rotor_commands(future, std::span{flight.body.command_ratio}.first(4));
+  (void)flight.monitor.on_imu({future, flight.body.accel_m_s2, flight.body.gyro_rad_s}, Phase::kOnGround);
+  ASSERT_EQ(flight.monitor.reason(), NotJudged::kNotFlying);
+  flight.monitor.on_clock(flight.now() + from_seconds(0.05));
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kNoInput);
+}
+
 TEST(ActuatorMonitor, WithoutRotorInputItSaysSo) {
   HoveringMultirotor body{4, 1};
   ActuatorMonitor monitor{Flight::params(body.vehicle, InputSource::kAuto)};

@@ -31,12 +31,21 @@ EffectivenessParams params() {
 /// Hover of a body that answers exactly as described, with white noise of the sensors.
 class Hover : public test::HoveringQuad {
  public:
-  explicit Hover(const EffectivenessParams& given = params()) : HoveringQuad{17}, monitor{given} {}
+  explicit Hover(const EffectivenessParams& given = params())
+      : HoveringQuad{17}, monitor{given}, imu_position_m_{given.vehicle.imu_position_m} {
+    under_way_.reserve(64);
+  }
 
   EffectivenessMonitor monitor;
   std::array<double, 3> push_m_s2{};
   Phase phase = Phase::kInFlight;
   Duration inertial_late{0};  ///< how much later than the speeds the inertial data are stamped
+  Duration reports_late{0};   ///< how long the reports are on their way
+  int report_every = 1;       ///< so many steps
+  bool sends_commands = false;
+  bool frozen_gyro = false;
+  bool frozen_accel = false;
+  bool holds = false;  ///< every inertial sample comes twice
   double step_s = kStep_s;
   std::optional<LossEvent> event;
 
@@ -47,18 +56,53 @@ class Hover : public test::HoveringQuad {
       time_s_ += step_s;
       std::array<double, 4> speed{};
       step(step_s, [&](std::size_t i, double speed_rad_s) { speed[i] = speed_rad_s + noise(0.5); });
-      event = monitor.on_speeds(now(), speed);
+      tell_speeds(speed);
       if (event) return;
-      event = monitor.on_imu(
-          now() + inertial_late,
-          {push_m_s2[0] + noise(0.3), push_m_s2[1] + noise(0.3), push_m_s2[2] + measured_vertical_m_s2()},
-          measured_rates_rad_s(), phase);
+      measure();
+      event = monitor.on_imu(now() + inertial_late, accel_m_s2_, gyro_rad_s_, phase);
     }
   }
 
   [[nodiscard]] TimePoint now() const { return from_us(1'000'000 + std::llround(time_s_ * 1e6)); }
 
  private:
+  struct Report {
+    TimePoint stamp;
+    std::array<double, 4> speed_rad_s;
+  };
+
+  void tell_speeds(const std::array<double, 4>& speed_rad_s) {
+    if (sends_commands) {
+      std::array<double, 4> command{};
+      for (std::size_t i = 0; i < 4; ++i) command[i] = (speed_rad_s[i] - 100.0) / 1200.0;
+      event = monitor.on_commands(now(), command);
+      if (event) return;
+    }
+    if (steps_++ % report_every == 0) under_way_.push_back({now(), speed_rad_s});
+    while (!event && !under_way_.empty() && now() - under_way_.front().stamp >= reports_late) {
+      event = monitor.on_speeds(under_way_.front().stamp, under_way_.front().speed_rad_s);
+      under_way_.erase(under_way_.begin());
+    }
+  }
+
+  void measure() {
+    if (holds && steps_ % 2 == 0) return;
+    const std::array accel{push_m_s2[0] + noise(0.3), push_m_s2[1] + noise(0.3),
+                           push_m_s2[2] + measured_vertical_m_s2()};
+    const auto gyro = measured_rates_rad_s();
+    if (!frozen_gyro) gyro_rad_s_ = gyro;
+    if (frozen_accel) return;
+    accel_m_s2_ = accel;
+    const auto turning = turning_rad_s2();
+    accel_m_s2_[0] += turning[1] * imu_position_m_[2];
+    accel_m_s2_[1] -= turning[0] * imu_position_m_[2];
+  }
+
+  std::array<double, 3> imu_position_m_;
+  std::array<double, 3> accel_m_s2_{};
+  std::array<double, 3> gyro_rad_s_{};
+  std::vector<Report> under_way_;
+  int steps_ = 0;
   double time_s_ = 0.0;
 };
 
@@ -102,20 +146,18 @@ TEST(EffectivenessMonitor, ReadsWhatIsLeftAndThenWhatIsLost) {
   EXPECT_EQ(hover.event->kind, LossKind::kPropellerLost);
 }
 
-TEST(EffectivenessMonitor, ReadsASuddenExcess) {
+TEST(EffectivenessMonitor, ASuddenExcessIsNobodysFault) {
   Hover hover;
   hover.fly(5.0);
   hover.effectiveness[2] = 1.4;
+  hover.fly(3.0);
+  EXPECT_FALSE(hover.event);
+  EXPECT_GT(hover.monitor.impossible_gains(), 0);
+  hover.effectiveness[1] = 0.0;
   hover.fly(1.0);
   ASSERT_TRUE(hover.event);
-  EXPECT_EQ(hover.event->kind, LossKind::kOverEffective);
-  EXPECT_EQ(hover.event->rotor, 2U);
-  EXPECT_NEAR(hover.event->effectiveness, 1.4, 4.0 * hover.event->sigma + 0.02);
-  EXPECT_GT(hover.event->probability, 0.99);
-  EXPECT_EQ(hover.event->threshold, hover.monitor.test().threshold());
-  hover.event.reset();
-  hover.fly(3.0);
-  EXPECT_FALSE(hover.event) << "the model now expects it";
+  EXPECT_EQ(hover.event->rotor, 1U);
+  EXPECT_EQ(hover.event->kind, LossKind::kPropellerLost);
 }
 
 /// Everything that is said within `seconds`.
@@ -131,12 +173,20 @@ std::vector<LossEvent> said_within(Hover& hover, double seconds) {
   return said;
 }
 
+/// In flight with a propeller on rotor i + 1 that gives half as much again, which is known.
+void fly_with_known_excess(Hover& hover, std::size_t rotor) {
+  hover.wander_ratio = 0.05;
+  hover.effectiveness[rotor] = 1.5;
+  const auto said = said_within(hover, 60.0);
+  ASSERT_FALSE(said.empty());
+  ASSERT_EQ(said.front().kind, LossKind::kOverEffective);
+  ASSERT_EQ(said.front().rotor, rotor);
+  ASSERT_TRUE(hover.monitor.slow().is_active(rotor));
+}
+
 TEST(EffectivenessMonitor, AnExcessThatGoesIsOverAndNoLoss) {
   Hover hover;
-  hover.fly(5.0);
-  hover.effectiveness[2] = 1.4;
-  ASSERT_FALSE(said_within(hover, 3.0).empty());
-  EXPECT_TRUE(hover.monitor.slow().is_active(2));
+  fly_with_known_excess(hover, 2);
   hover.effectiveness[2] = 1.0;
   const auto said = said_within(hover, 3.0);
   ASSERT_FALSE(said.empty());
@@ -151,14 +201,12 @@ TEST(EffectivenessMonitor, AnExcessThatGoesIsOverAndNoLoss) {
 
 TEST(EffectivenessMonitor, AnExcessThatBecomesALossIsALoss) {
   Hover hover;
-  hover.fly(5.0);
-  hover.effectiveness[2] = 1.4;
-  ASSERT_FALSE(said_within(hover, 3.0).empty());
+  fly_with_known_excess(hover, 2);
   hover.effectiveness[2] = 0.7;
   const auto said = said_within(hover, 5.0);
   ASSERT_FALSE(said.empty());
   EXPECT_EQ(said.back().kind, LossKind::kPartialLoss);
-  EXPECT_NEAR(said.back().effectiveness, 0.7, 0.05);
+  EXPECT_NEAR(said.back().effectiveness, 0.7, 0.1);
   EXPECT_FALSE(said.back().is_over);
   EXPECT_FALSE(hover.monitor.slow().is_active(2));
 }
@@ -181,17 +229,14 @@ TEST(EffectivenessMonitor, ALossThatComesBackIsNoExcess) {
 // A propeller may be changed on the ground; a loss stays latched.
 TEST(EffectivenessMonitor, OnTheGroundNobodyGivesTooMuchAnyMore) {
   Hover hover;
-  hover.fly(5.0);
-  hover.effectiveness = {1.0, 0.6, 1.0, 1.0};
-  ASSERT_FALSE(said_within(hover, 3.0).empty());
-  hover.effectiveness = {1.0, 0.6, 1.0, 1.4};
+  fly_with_known_excess(hover, 3);
+  hover.effectiveness[1] = 0.6;
   ASSERT_FALSE(said_within(hover, 3.0).empty());
   ASSERT_GT(hover.monitor.effectiveness(3), 1.2);
   ASSERT_TRUE(hover.monitor.slow().is_active(3));
   hover.phase = Phase::kOnGround;
   hover.fly(0.1);
   EXPECT_EQ(hover.monitor.effectiveness(3), 1.0);
-  EXPECT_EQ(hover.monitor.slow().effectiveness(3), 1.0);
   EXPECT_NEAR(hover.monitor.effectiveness(1), 0.6, 0.15);
   EXPECT_TRUE(hover.monitor.slow().is_active(3)) << "to be judged in the next flight";
 }
@@ -264,7 +309,8 @@ TEST(EffectivenessMonitor, RotorsThatHardlyLiftAreNotJudged) {
   for (int i = 1; i <= 100; ++i) {
     const TimePoint time = from_us(std::llround((time_s + i * kStep_s) * 1e6));
     static_cast<void>(hover.monitor.on_speeds(time, std::array{110.0 + 0.1 * (i % 3), 110.0, 110.0, 110.0}));
-    EXPECT_FALSE(hover.monitor.on_imu(time, {0.0, 0.0, -0.3}, {}, Phase::kInFlight));
+    const double noise = 1e-4 * (i % 2);
+    EXPECT_FALSE(hover.monitor.on_imu(time, {0.0, 0.0, -0.3 + noise}, {noise, 0.0, 0.0}, Phase::kInFlight));
   }
   EXPECT_EQ(hover.monitor.muted(), Muted::kNoThrust);
   EXPECT_LT(hover.monitor.judged_s() - judged_s, 0.1);
@@ -348,6 +394,127 @@ TEST(EffectivenessMonitor, AClockThatJumpsForwardBlamesNobody) {
     ASSERT_TRUE(hover.event) << seconds;
     EXPECT_EQ(hover.event->rotor, 1U) << seconds;
   }
+}
+
+// A gyroscope that repeats its last value while the body turns on: nobody has lost anything.
+TEST(EffectivenessMonitor, AnInertialUnitThatRepeatsItselfIsNoMeasurement) {
+  for (const bool is_gyro : {true, false}) {
+    Hover hover;
+    hover.wander_ratio = 0.05;
+    hover.fly(5.0);
+    ASSERT_EQ(hover.monitor.muted(), Muted::kNot);
+    hover.frozen_gyro = is_gyro;
+    hover.frozen_accel = !is_gyro;
+    hover.fly(0.1);
+    EXPECT_EQ(hover.monitor.muted(), Muted::kFrozen);
+    EXPECT_EQ(hover.monitor.samples_repeated() > 40, is_gyro);
+    hover.frozen_gyro = hover.frozen_accel = false;
+    hover.fly(5.0);
+    EXPECT_FALSE(hover.event) << "rotor " << hover.event->rotor + 1;
+    EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
+    hover.effectiveness[1] = 0.0;
+    hover.fly(0.2);
+    ASSERT_TRUE(hover.event);
+    EXPECT_EQ(hover.event->rotor, 1U);
+  }
+}
+
+// Every second sample twice, as where a driver polls faster than the sensor measures.
+TEST(EffectivenessMonitor, HeldSamplesDoNotHinder) {
+  Hover hover;
+  hover.holds = true;
+  hover.fly(5.0);
+  EXPECT_FALSE(hover.event);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
+  hover.effectiveness[3] = 0.0;
+  const TimePoint onset = hover.now();
+  hover.fly(0.2);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->rotor, 3U);
+  EXPECT_LT(hover.event->decided - onset, Duration{25'000});
+}
+
+TEST(EffectivenessMonitor, WhatNoSensorMeasuresIsRefusedAndForgotten) {
+  for (const double value : {201.0, 1e200, -1e200}) {
+    Hover hover;
+    hover.fly(5.0);
+    hover.jump(kStep_s);
+    EXPECT_FALSE(
+        hover.monitor.on_imu(hover.now(), {0.0, 0.0, -9.8}, {value, value, value}, Phase::kInFlight));
+    EXPECT_FALSE(hover.monitor.on_imu(hover.now(), {2001.0, 0.0, -9.8}, {}, Phase::kInFlight));
+    EXPECT_EQ(hover.monitor.samples_dropped(), 2);
+    hover.fly(3.0);
+    EXPECT_FALSE(hover.event);
+    EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
+    EXPECT_NEAR(hover.monitor.gyro_sigma(0), 0.02, 0.01);
+    hover.effectiveness[1] = 0.0;
+    hover.fly(0.2);
+    ASSERT_TRUE(hover.event) << value;
+    EXPECT_EQ(hover.event->rotor, 1U);
+  }
+}
+
+TEST(EffectivenessMonitor, OneStampOfTheFutureIsForgotten) {
+  Hover hover;
+  hover.fly(5.0);
+  const TimePoint before = hover.now();
+  EXPECT_FALSE(hover.monitor.on_imu(hover.now() + std::chrono::hours{1}, {0.01, 0.0, -9.8}, {0.01, 0.0, 0.0},
+                                    Phase::kInFlight));
+  hover.fly(4.0);
+  EXPECT_FALSE(hover.event);
+  EXPECT_EQ(hover.monitor.stamps_restarted(), 1);
+  EXPECT_EQ(hover.monitor.newest_sample(), hover.now());
+  EXPECT_GT(hover.monitor.newest_sample(), before);
+  EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
+  hover.effectiveness[2] = 0.0;
+  hover.fly(0.2);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->rotor, 2U);
+}
+
+// Stamped when it was measured, telemetry may be on its way for longer than its interval: no rotor is silent for that.
+TEST(EffectivenessMonitor, LateReportsAreNoSilence) {
+  for (const int late_ms : {0, 15, 25, 60}) {
+    Hover hover;
+    hover.reports_late = Duration{1'000 * late_ms};
+    hover.sends_commands = true;
+    hover.fly(5.0);
+    ASSERT_FALSE(hover.event) << late_ms;
+    hover.effectiveness[1] = 0.0;
+    const TimePoint onset = hover.now();
+    hover.fly(0.3);
+    ASSERT_TRUE(hover.event) << late_ms;
+    EXPECT_EQ(hover.event->rotor, 1U);
+    EXPECT_LT(hover.event->decided - onset, Duration{25'000}) << late_ms;
+  }
+}
+
+TEST(EffectivenessMonitor, WithoutCommandsReportsMustBeFrequentAndInTime) {
+  Hover late;
+  late.reports_late = Duration{40'000};
+  late.fly(5.0);
+  EXPECT_EQ(late.monitor.muted(), Muted::kSpeedsLate);
+  Hover seldom;
+  seldom.report_every = 25;  // 50 ms
+  seldom.fly(5.0);
+  EXPECT_EQ(seldom.monitor.muted(), Muted::kSpeedsLate);
+  seldom.sends_commands = true;
+  seldom.fly(5.0);
+  EXPECT_EQ(seldom.monitor.muted(), Muted::kNot);
+}
+
+// The accelerometer hangs far below the centre of mass: when a rotor stops, the body turns it sideways.
+TEST(EffectivenessMonitor, AnAccelerometerBesideTheCentreOfMassFeelsNoPush) {
+  EffectivenessParams described = params();
+  described.vehicle.imu_position_m = {0.0, 0.0, -0.08};
+  Hover hover{described};
+  hover.fly(5.0);
+  hover.effectiveness[1] = 0.0;
+  const TimePoint onset = hover.now();
+  hover.fly(0.3);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->rotor, 1U);
+  EXPECT_LT(hover.event->decided - onset, Duration{25'000});
 }
 
 TEST(EffectivenessMonitor, UsesNoHeap) {

@@ -16,6 +16,8 @@ using Sample = MotionSample<double>;
 
 constexpr double kStep_s = 0.002;
 constexpr std::array<LossRange<double>, 2> kRanges{LossRange<double>{0.5, 1.1, 1e9}, {0.15, 1.1, 1e9}};
+constexpr std::array<LossRange<double>, 3> kWithGains{
+    LossRange<double>{0.5, 1.1, 1e9}, {0.15, 1.1, 1e9}, {-0.15, -1.1, 1e9}};
 
 /// Axes that keep no state: innovations are what is missing plus white noise, so that sums have closed forms.
 Sample white_sample(int step, const std::array<double, 3>& innovation) {
@@ -126,8 +128,6 @@ TEST(RotorLossTest, AGreaterLossIsNeverFoundLater) {
 }
 
 TEST(RotorLossTest, AGainIsItsOwnAndNotTheLossOfTheOpposite) {
-  constexpr std::array<LossRange<double>, 3> kWithGains{
-      LossRange<double>{0.5, 1.1, 1e9}, {0.15, 1.1, 1e9}, {-0.15, -1.1, 1e9}};
   for (const double gain : {0.3, 0.8}) {
     RotorLossTest<double, kMaxRotors, 3> test{4, {}, kWithGains};
     int steps = 0;
@@ -140,6 +140,65 @@ TEST(RotorLossTest, AGainIsItsOwnAndNotTheLossOfTheOpposite) {
     // Of the rivals the opposite rotor comes nearest: the same moments, the wrong lift.
     EXPECT_GT(finding->second, 0.0);
     EXPECT_LT(finding->second, finding->evidence - 8.0);
+  }
+}
+
+// Moments without a word about the lift: rotor 2 has regained something or its opposite has lost something.
+TEST(RotorLossTest, WhatWasLostComesBackRatherThanThatAnotherLosesSomething) {
+  const auto named = [](double most_return) {
+    RotorLossTest<double, kMaxRotors, 3> test{4, {}, kWithGains};
+    test.may_return(1, most_return);
+    // Between two rotors with the same evidence the likelier one is ahead by just the margin.
+    for (int step = 0; step < 1000; ++step) {
+      Sample sample = white_sample(step, trace_of_loss(1, -0.3));
+      sample.vertical.variance = 1e12;
+      test.step(sample);
+    }
+    EXPECT_NEAR(test.evidence(2, 1), test.evidence(1, 3), 1e-6);
+    std::size_t rotor = 0;
+    for (std::size_t range = 0; range < 3; ++range) {
+      const auto leading = test.leading(range);
+      if (leading.evidence - leading.second > 7.9) rotor = leading.rotor + 1;
+    }
+    return rotor;
+  };
+  EXPECT_EQ(named(0.5), 2U);
+  EXPECT_EQ(named(0.25), 4U);  // more than it had lost
+  EXPECT_EQ(named(0.0), 4U);   // it had lost nothing
+}
+
+// The range of great losses decides first and reads at least its own smallest.
+TEST(RotorLossTest, TheSizeIsReadWhereMostIsExplained) {
+  for (const double loss : {0.4, 0.8}) {
+    LossTest test{4, {}, kRanges};
+    int steps = 0;
+    while (!(test.finding() && test.finding()->range == 0) && steps < 1000)
+      test.step(white_sample(steps++, trace_of_loss(1, loss)));
+    ASSERT_TRUE(test.finding()) << loss;
+    EXPECT_NEAR(test.finding()->loss, loss, 1e-6);
+  }
+}
+
+// A sum that began with something that has passed, and is neither refuted nor fed, must not hide what begins now.
+TEST(RotorLossTest, AFruitlessSumStartsAnew) {
+  for (const bool says_enough : {false, true}) {
+    LossTest test{4, {}, kRanges};
+    int step = 0;
+    const auto feed = [&](double loss, double variance_scale) {
+      Sample sample = white_sample(step++, trace_of_loss(1, loss));
+      for (auto& axis : sample.rate) axis.variance *= variance_scale;
+      sample.vertical.variance *= variance_scale;
+      test.step(sample);
+    };
+    for (int i = 0; i < (says_enough ? 40 : 4); ++i) feed(0.5, 1.0);
+    ASSERT_GT(test.evidence(1, 1), 0.0);
+    ASSERT_EQ(test.evidence(1, 1) > 8.0, says_enough);
+    const TimePoint begun = test.leading(1).onset;
+    while (step < 250) feed(0.0, 1e12);
+    EXPECT_EQ(test.leading(1).onset, begun);
+    while (step < 260) feed(0.0, 1e12);
+    feed(0.5, 1.0);
+    EXPECT_EQ(test.leading(1).onset > begun, !says_enough);
   }
 }
 
