@@ -67,7 +67,7 @@ rt::Expected<Flights> run_configured(const Options& options) {
     eval::JudgementLog judgement;
     flights[i] = eval::run_flight(log, detector->process,
                                   [&](rt::Node& node) { return detector->make(node, judgement); });
-    if (flights[i]) flights[i]->judgement = std::move(judgement);
+    if (flights[i] && judgement.has_any()) flights[i]->judgement = std::move(judgement);
     if (flights[i] && flights[i]->vehicle != detector->vehicle) {
       flights[i] = rt::fail_with(fmt::format("{}: of vehicle \"{}\", but {} is of \"{}\"", log,
                                              flights[i]->vehicle, options.config_path, detector->vehicle));
@@ -155,8 +155,8 @@ int run(int argc, char** argv) {
       ->needs(nested_flag);
   app.add_flag(
       "--muted", options.muted,
-      "also print, for --detector effectiveness, how long each flight was judged and which seconds were "
-      "not, by cause; with --json it is always there");
+      "also print how long each flight was judged and which seconds were not, by cause, and how long each "
+      "component; to half a second, effectiveness to a sample; with --json it is always there");
   app.add_flag("--json", options.json, "print JSON instead of a table");
   app.add_option("--jobs", options.learning.jobs, "flights evaluated at a time")->check(CLI::Range(1U, 256U));
   try {

@@ -6,7 +6,7 @@
 
 #include "cli/calibrate/flight_name.h"
 #include "cli/calibrate/learning.h"
-#include "cli/eval/scoring.h"
+#include "cli/eval/flight.h"
 
 namespace airworthy::eval {
 

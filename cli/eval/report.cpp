@@ -126,6 +126,10 @@ std::string to_muted_table(const Evaluation& evaluation) {
                            to_seconds(one.until - flight.start));
       out += '\n';
     }
+    for (const auto& [component, its] : flight.components) {
+      out += fmt::format("  {}: judged {:.2f} s{}\n", component, its.judged_s(),
+                         its.muted().empty() ? "" : ", longest not: " + its.main_cause());
+    }
   }
   return out;
 }
@@ -155,6 +159,8 @@ std::string to_json(const Evaluation& evaluation) {
     if (flight.judgement.has_any()) {
       row["judged_s"] = flight.judgement.judged_s();
       row["muted"] = json_of(flight.judgement, flight.start);
+      for (const auto& [component, its] : flight.components)
+        row["components"][component] = {{"judged_s", its.judged_s()}, {"muted", json_of(its, flight.start)}};
     }
     if (flight.truth && flight.truth->onset) row["onset_us"] = to_us(*flight.truth->onset);
     if (score.outcome == Outcome::kTruePositive) row["delay_s"] = score.delay_s;

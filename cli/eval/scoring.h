@@ -1,41 +1,12 @@
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "cli/eval/judgement_log.h"
-#include "core/time/time.h"
+#include "cli/eval/flight.h"
 
 namespace airworthy::eval {
-
-/// A fault raised by a detector.
-struct Alarm {
-  TimePoint time;   ///< the sample that decided
-  TimePoint onset;  ///< as the detector estimates it
-  std::string component;
-  std::string fault_kind;
-  double magnitude = std::numeric_limits<double>::quiet_NaN();  ///< in the unit of its kind
-};
-
-/// What really happened in a flight.
-struct Truth {
-  std::string component;
-  std::string fault_kind;          ///< none = healthy
-  std::optional<TimePoint> onset;  ///< empty = healthy
-};
-
-/// One flight as the detectors saw it.
-struct Flight {
-  std::string name;
-  std::string vehicle;
-  std::optional<Truth> truth;  ///< empty = not known: shown, never scored
-  TimePoint start;
-  TimePoint end;
-  std::vector<Alarm> alarms;  ///< in order of time
-  JudgementLog judgement;
-};
 
 struct Rules {
   Duration warm_up{20'000'000};  ///< alarms so early in a flight, and that time, do not count

@@ -14,11 +14,11 @@ TimePoint at(double seconds) { return from_us(0) + from_seconds(kStart_s + secon
 Flight flight(std::optional<double> onset_s, std::vector<double> alarms_s, double duration_s = 120) {
   Flight flight;
   flight.name = "f";
-  flight.truth = Truth{"engine", onset_s ? "thrust_loss" : "none", std::nullopt};
+  flight.truth = Truth{"engine", onset_s ? "thrust_loss" : "none", std::nullopt, std::nullopt};
   if (onset_s) flight.truth->onset = at(*onset_s);
   flight.start = at(0);
   flight.end = at(duration_s);
-  for (const double t : alarms_s) flight.alarms.push_back({at(t), at(t), "engine", "thrust_loss"});
+  for (const double t : alarms_s) flight.alarms.push_back({at(t), at(t), "engine", "thrust_loss", 0.0, {}});
   return flight;
 }
 
