@@ -19,6 +19,18 @@ namespace {
 
 using namespace airworthy;
 
+constexpr const char* kRules = R"(What counts
+  The first alarm of a flight decides: silent, found, missed, false alarm, or early (before the fault: a false alarm
+  and a miss). Beside "found" stands whether the part named is the failed one (or the control lost with it), one of
+  several candidates, or another.
+  A fault that the detector does not watch, or that begins after the end of the log, is said and not looked for: the
+  flight counts as healthy, and an alarm in it is a false one.
+  Alarms of the first 20 s of a flight, and that time, do not count with --detector response, which learns meanwhile.
+  A flight of which nothing was judged is "not judged", never silent. False alarms per hour are of judged time.
+Exit code
+  0; 64 wrong use; 65 a log was refused; 66 of a flight nothing was judged; 78 wrong configuration.
+docs/evaluation.md has the rules whole.)";
+
 // The configured detector; where there is a calibration it must be of the log's own vehicle.
 rt::Expected<eval::Flight> run_one(const std::string& log, const response::ResponseConfig& config,
                                    const std::optional<response::Calibration>& calibration) {
@@ -94,6 +106,14 @@ rt::Expected<Flights> run_response(const Options& options, const calibrate::Flig
                         : run_all(options.logs, *config, calibration, options.learning.jobs);
 }
 
+// Only the response detector needs time to learn the flight.
+eval::Rules rules_of(const Options& options) {
+  eval::Rules rules;
+  rules.detector = options.detector;
+  if (!options.is_response()) rules.warm_up = Duration{0};
+  return rules;
+}
+
 int evaluate(const Options& options) {
   const auto flight_name = calibrate::FlightName::parse(options.flight_name_pattern);
   if (!flight_name) return rt::fail(EX_USAGE, flight_name.error());
@@ -104,25 +124,27 @@ int evaluate(const Options& options) {
   }
   auto flights = options.is_response() ? run_response(options, *flight_name) : run_configured(options);
   if (!flights) return rt::fail(EX_CONFIG, flights.error());
-  // Only the response detector needs time to learn the flight.
-  eval::Rules rules;
-  if (!options.is_response()) rules.warm_up = Duration{0};
-  eval::Rules tolerant = rules;
-  tolerant.onset_tolerance = Duration{500'000};
   eval::Evaluation evaluation;
-  int failures = 0;
+  evaluation.rules = rules_of(options);
+  eval::Rules tolerant = evaluation.rules;
+  tolerant.onset_tolerance = Duration{500'000};
+  int code = EX_OK;
   for (auto& flight : *flights) {
     if (!flight) {
-      failures = rt::fail(EX_DATAERR, flight.error());
+      code = rt::fail(EX_DATAERR, flight.error());
       continue;
     }
-    evaluation.scores.push_back(eval::score(*flight, rules));
+    evaluation.scores.push_back(eval::score(*flight, evaluation.rules));
     evaluation.tolerant_scores.push_back(eval::score(*flight, tolerant));
     evaluation.flights.push_back(std::move(*flight));
   }
   fmt::print("{}", options.json ? eval::to_json(evaluation) : eval::to_table(evaluation));
   if (options.muted && !options.json) fmt::print("\n{}", eval::to_muted_table(evaluation));
-  return failures;
+  if (const std::string silence = eval::not_judged_lines(evaluation); !silence.empty()) {
+    const int not_judged = rt::fail(EX_NOINPUT, rt::Error{silence});
+    if (code == EX_OK) code = not_judged;
+  }
+  return code;
 }
 
 int run(int argc, char** argv) {
@@ -130,6 +152,7 @@ int run(int argc, char** argv) {
       "Runs a configured detector over recorded flights, on message time, and scores it against the truth in "
       "the logs.",
       "airworthy eval"};
+  app.footer(kRules);
   Options options;
   options.learning.jobs = std::max(1U, std::thread::hardware_concurrency());
   app.add_option("LOG", options.logs, "LCM logs, for example from 'airworthy import' or 'airworthy sim'")
