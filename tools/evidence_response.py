@@ -29,8 +29,9 @@ def tool(name, *arguments, accepted=(0,)):
     return done.stdout
 
 
-def evaluate(config, logs, *options):
-    return json.loads(tool("eval", "--json", "--config", ROOT / "config" / config, *options, *logs, accepted=(0, NOT_JUDGED)))
+def evaluate(vehicle, config, logs, *options):
+    return json.loads(tool("eval", "--json", "--vehicle", vehicle, "--config", ROOT / "config" / config, *options, *logs,
+                           accepted=(0, NOT_JUDGED)))
 
 
 def number(value, digits=2):
@@ -77,18 +78,18 @@ def alfa(_):
         logs = {source: [log for log in sorted((folder / source).glob("*.lcm")) if "no_ground_truth" not in log.name]
                 for source in ("csv", "mavlink")}
         nested = ("--nested", "--flight-name", FLIGHT)
-        rows = [totals_row("published method, to the letter", "CSV", evaluate("response_arx.toml", logs["csv"]))]
+        rows = [totals_row("published method, to the letter", "CSV", evaluate("alfa", "response_arx.toml", logs["csv"]))]
         results = {}
         for source, title in (("csv", "CSV"), ("mavlink", "MAVLink")):
             calibration = folder / f"{source}.toml"
             tool("calibrate", "--config", ROOT / "config/response.toml", "--vehicle", "alfa", "--flight-name", FLIGHT,
                  "-o", calibration, *logs[source])
             results[source] = {
-                "cold": evaluate("response.toml", logs[source]),
-                "warm, in-sample": evaluate("response.toml", logs[source], "--calibration", calibration),
-                "warm, nested": evaluate("response.toml", logs[source], *nested)}
+                "cold": evaluate("alfa", "response.toml", logs[source]),
+                "warm, in-sample": evaluate("alfa", "response.toml", logs[source], "--calibration", calibration),
+                "warm, nested": evaluate("alfa", "response.toml", logs[source], *nested)}
             rows += [totals_row(method, title, result) for method, result in results[source].items()]
-        rates = [totals_row(f"{rate} per hour", "CSV", evaluate("response.toml", logs["csv"], *nested,
+        rates = [totals_row(f"{rate} per hour", "CSV", evaluate("alfa", "response.toml", logs["csv"], *nested,
                                                                  "--false-alarms-per-hour", rate))
                  for rate in ("0.1", "0.03", "0.01", "0.003", "0.001")]
     header = ["| method | input | TP | FP | FN | TN | precision | recall | accuracy | within 10 s | delay median, mean, max s "
@@ -126,14 +127,18 @@ def eval_throughput(binaries):
              "| jobs | flight hours | time | flight hours per minute | ratio to one job |", "|--:|--:|--:|--:|--:|"]
     with tempfile.TemporaryDirectory() as name:
         run(binaries / "airworthy-import", "alfa", *sorted((data / "alfa").glob("carbonZ*")), "-o", name, capture_output=True)
-        logs = sorted(pathlib.Path(name).glob("*.lcm")) * copies
+        logs = []
+        for flight in sorted(pathlib.Path(name).glob("*.lcm")):
+            logs += [flight.with_name(f"{i}_{flight.name}") for i in range(copies)]
+            for copy in logs[-copies:]:
+                copy.hardlink_to(flight)  # eval takes no log twice
         single = None
         for jobs in sorted({1, 2, os.cpu_count()}):
             durations = []
             for _ in range(repetitions):
                 begun = time.monotonic()
-                done = run(binaries / "airworthy-eval", "--json", "--jobs", jobs, "--config", ROOT / "config/response.toml", *logs,
-                           capture_output=True)
+                done = run(binaries / "airworthy-eval", "--json", "--jobs", jobs, "--vehicle", "alfa", "--config",
+                           ROOT / "config/response.toml", *logs, capture_output=True)
                 durations.append(time.monotonic() - begun)
                 if done.returncode != 0:
                     raise Failed(f"airworthy eval failed:\n{done.stderr}")
@@ -189,7 +194,7 @@ def elevon_rows(data, folder):
     rows, alarms_elsewhere, healthy_s, found, count = [], [], 0.0, 0, 0
     for source in sorted(path for path in (data / "daredevil_faults").iterdir() if path.is_dir()):
         log, = imported("daredevil_faults.toml", [source], folder / source.name)
-        flight, = evaluate("response_elevon.toml", [log])["flights"]
+        flight, = evaluate("daredevil", "response_elevon.toml", [log])["flights"]
         alarms = [(alarm["time_us"] / 1e6, alarm["component"]) for alarm in flight["alarms"]]
         faults = injected_faults(source)
         for begin, end, what in faults:
@@ -211,15 +216,15 @@ def response_sets(_):
         folder = pathlib.Path(name)
         faults, elevon_summary = elevon_rows(data, folder)
         runs = imported("rflymad_sim.toml", sorted((data / "rflymad_sim").glob("TestCase*")), folder / "rflymad")
-        rotor = evaluate("response_multirotor.toml", runs)
-        sets = {"crazyflie_brushless_rpm": ("crazyflie_brushless_rpm.toml", "*.csv.xz"),
-                "crazypad/controller": ("crazypad_controller.toml", "normal*.csv.xz"),
-                "crazypad/motor": ("crazypad_motor.toml", "normal*.csv.xz"),
-                "indiflight_throw": ("indiflight_throw.toml", "*.csv.xz")}
+        rotor = evaluate("rflymad", "response_multirotor.toml", runs)
+        sets = {"crazyflie_brushless_rpm": ("crazyflie", "crazyflie_brushless_rpm.toml", "*.csv.xz"),
+                "crazypad/controller": ("crazyflie", "crazypad_controller.toml", "normal*.csv.xz"),
+                "crazypad/motor": ("crazyflie", "crazypad_motor.toml", "normal*.csv.xz"),
+                "indiflight_throw": ("indiflight", "indiflight_throw.toml", "*.csv.xz")}
         lift = []
-        for set_name, (table_map, pattern) in sets.items():
+        for set_name, (vehicle, table_map, pattern) in sets.items():
             logs = imported(table_map, sorted((data / set_name).glob(pattern)), folder / set_name.replace("/", "_"))
-            result = evaluate("response_lift.toml", logs)
+            result = evaluate(vehicle, "response_lift.toml", logs)
             totals = result["totals"]
             low, high = totals["false_alarms_per_hour_95"]
             alarms = sum(len(flight["alarms"]) for flight in result["flights"])

@@ -135,6 +135,14 @@ rt::Expected<Flight> run_flight(const std::string& log_path, const std::string& 
   return flight;
 }
 
+rt::Expected<void> check_vehicle(const std::string& log, const std::string& vehicle,
+                                 const std::string& expected) {
+  if (vehicle == expected) return {};
+  return rt::fail_with(
+      fmt::format("{}: of vehicle \"{}\", not of \"{}\" (--vehicle NAME says whose logs these are)", log,
+                  vehicle, expected));
+}
+
 rt::Expected<Flight> run_flight(const std::string& log_path, response::ResponseConfig config,
                                 TickObserver observer) {
   return run_flight(log_path, "airworthy-response", [&](rt::Node& node) {

@@ -22,6 +22,10 @@ using MakeDetector = std::function<Detector(rt::Node& node)>;
 [[nodiscard]] rt::Expected<Flight> run_flight(const std::string& log_path, const std::string& process,
                                               const MakeDetector& make);
 
+/// An error where a log is not of the vehicle that it is to be of.
+[[nodiscard]] rt::Expected<void> check_vehicle(const std::string& log, const std::string& vehicle,
+                                               const std::string& expected);
+
 /// Sees the response detector after each of its ticks.
 using TickObserver = std::function<void(const response::ResponseMonitor&)>;
 

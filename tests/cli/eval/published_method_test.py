@@ -34,7 +34,7 @@ class PublishedMethod(unittest.TestCase):
         cls.folder.cleanup()
 
     def evaluate(self, config, expected_code=0, **settings):
-        command = [EVAL, "--json", "--config", CONFIG / config]
+        command = [EVAL, "--json", "--vehicle", "alfa", "--config", CONFIG / config]
         for key, value in settings.items():
             for channel in (0, 1):
                 command += ["--set", f"channel[{channel}].{key}={json.dumps(value)}"]
