@@ -103,6 +103,11 @@ Json json_of(const JudgementLog& judgement, TimePoint start) {
   return causes;
 }
 
+Json json_of(const Alarm& alarm) {
+  return {{"time_us", to_us(alarm.time)},   {"onset_us", to_us(alarm.onset)}, {"component", alarm.component},
+          {"fault_kind", alarm.fault_kind}, {"candidates", alarm.candidates}, {"magnitude", alarm.magnitude}};
+}
+
 Json json_of(const std::vector<FaultScore>& faults, TimePoint start) {
   Json rows = Json::array();
   for (const FaultScore& one : faults) {
@@ -203,20 +208,14 @@ std::string to_json(const Evaluation& evaluation) {
     const Flight& flight = evaluation.flights[i];
     const Score& score = evaluation.scores[i];
     Json alarms = Json::array();
-    for (const Alarm& alarm : flight.alarms) {
-      alarms.push_back({{"time_us", to_us(alarm.time)},
-                        {"onset_us", to_us(alarm.onset)},
-                        {"component", alarm.component},
-                        {"fault_kind", alarm.fault_kind},
-                        {"candidates", alarm.candidates},
-                        {"magnitude", alarm.magnitude}});
-    }
+    for (const Alarm& alarm : flight.alarms) alarms.push_back(json_of(alarm));
     Json row{{"flight", flight.name},
              {"truth", fault_of(flight, score)},
              {"faults", json_of(score.faults, flight.start)},
              {"onset_us", nullptr},
              {"outcome", to_string(score.outcome)},
              {"named", nullptr},
+             {"first_alarm", nullptr},
              {"delay_s", nullptr},
              {"false_alarms", score.false_alarms},
              {"healthy_s", score.healthy_s},
@@ -231,6 +230,7 @@ std::string to_json(const Evaluation& evaluation) {
         row["components"][component] = {{"judged_s", its.judged_s()}, {"muted", json_of(its, flight.start)}};
     }
     if (flight.truth && flight.truth->onset) row["onset_us"] = to_us(*flight.truth->onset);
+    if (score.first) row["first_alarm"] = json_of(*score.first);
     if (score.outcome == Outcome::kTruePositive) {
       row["delay_s"] = score.delay_s;
       row["named"] = to_string(score.named);
