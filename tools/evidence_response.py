@@ -41,8 +41,8 @@ def number(value, digits=2):
 def totals_row(name, source, result):
     totals = result["totals"]
     low, high = totals["false_alarms_per_hour_95"]
-    return (f"| {name} | {source} | {totals['tp']} | {totals['named_right']} | {totals['named_another']} | {totals['fp']} | {totals['fn']} | {totals['tn']} | "
-            f"{totals['not_judged']} | "
+    counts = " | ".join(str(totals[key]) for key in ("tp", "named_right", "named_another", "fp", "fn", "tn", "not_judged"))
+    return (f"| {name} | {source} | {counts} | "
             f"{number(totals['precision'])} | {number(totals['recall'])} | {number(totals['accuracy'])} | "
             f"{totals['found_within_10_s']} | {number(totals['median_delay_s'])}, {number(totals['mean_delay_s'])}, "
             f"{number(totals['max_delay_s'])} | {number(totals['false_alarms_per_hour'], 1)} "
@@ -60,6 +60,10 @@ def by_fault(result):
             found, right, delays = found + 1, right + (flight["named"] == "right"), delays + [flight["delay_s"]]
         kinds[flight["truth"]] = (found, right, count + 1, delays)
     return kinds
+
+
+def how_found(found, right, count, delays):
+    return f"{found} of {count}" + (f", right {right}: {sum(delays) / len(delays):.2f}, {max(delays):.2f}" if delays else "")
 
 
 def what_happened(flight):
@@ -94,14 +98,11 @@ def alfa(_):
         rates = [totals_row(f"{rate} per hour", "CSV", evaluate("alfa", "response.toml", logs["csv"], *nested,
                                                                  "--false-alarms-per-hour", rate))
                  for rate in ("0.1", "0.03", "0.01", "0.003", "0.001")]
-    header = ["| method | input | TP | right | another | FP | FN | TN | not judged | precision | recall | accuracy | within 10 s | delay median, mean, max s "
-              "| false alarms per judged hour (95 %) |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|---|"]
+    header = ["| method | input | TP | right | another | FP | FN | TN | not judged | precision | recall | accuracy "
+              "| within 10 s | delay median, mean, max s | false alarms per judged hour (95 %) |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|---|"]
     kinds = {method: by_fault(result) for method, result in results["csv"].items()}
-    kind_rows = [
-        f"| {kind} | " + " | ".join(
-            f"{found} of {count}, {right}: {sum(delays) / len(delays):.2f}, {max(delays):.2f}" if delays else f"{found} of {count}"
-            for found, right, count, delays in (kinds[method].get(kind, (0, 0, 0, [])) for method in kinds)) + " |"
-        for kind in sorted(kinds["cold"])]
+    kind_rows = [f"| {kind} | " + " | ".join(how_found(*kinds[method].get(kind, (0, 0, 0, []))) for method in kinds) + " |"
+                 for kind in sorted(kinds["cold"])]
     flights = {method: {flight["flight"]: flight for flight in result["flights"]}
                for method, result in results["csv"].items()}
     flight_rows = [f"| {name} | " + " | ".join(what_happened(flights[method][name]) for method in flights) + " |"
@@ -118,7 +119,7 @@ def alfa(_):
         circumstances(), "", *header, *rows, "",
         "Nested, with thresholds for other false-alarm rates of each channel (0.01 per hour is the default):", "",
         *header, *rates, "",
-        "Found, named right by the first alarm, and delay mean and maximum in seconds (CSV):", "",
+        "Found, of these named right by the first alarm, and delay mean and maximum in seconds (CSV):", "",
         "| fault | " + " | ".join(kinds) + " |", "|---" * (len(kinds) + 1) + "|", *kind_rows, "",
         "| flight (CSV) | " + " | ".join(flights) + " |", "|---" * (len(flights) + 1) + "|", *flight_rows])
 
