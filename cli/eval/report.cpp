@@ -27,6 +27,7 @@ std::string fault_of(const Flight& flight, const Score& score) {
   for (const FaultScore& one : score.faults) {
     if (std::find(names.begin(), names.end(), name_of(one)) == names.end()) names.push_back(name_of(one));
   }
+  std::sort(names.begin(), names.end());  // flights with the same faults are one group, whichever came first
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -55,14 +56,29 @@ std::string named_counts(const Totals& t) {
                      t.named_another);
 }
 
+std::string totals_lines(const Totals& t, const Totals& tolerant) {
+  std::string out = totals_line("first alarm decides", t) + totals_line("0.5 s early allowed", tolerant);
+  out += fmt::format("of {} found: {}\n", t.tp, named_counts(t));
+  out += fmt::format(
+      "delay mean {} median {} max {} s   false alarms {} in {} h judged, of {} h healthy flight: {} "
+      "per hour judged (95 %: {} to {})\n",
+      number(t.mean_delay_s, 2), number(t.median_delay_s, 2), number(t.max_delay_s, 2), t.false_alarms,
+      number(t.judged_healthy_h, 3), number(t.healthy_h, 3), number(t.false_alarms_per_hour, 1),
+      number(t.false_alarms_per_hour_low, 1), number(t.false_alarms_per_hour_high, 1));
+  return out;
+}
+
 // How a group of flights with the same faults did; a group without a fault to find is of healthy flights.
 std::string group_line(const std::string& fault, std::size_t width, const std::vector<Score>& scores) {
   const Totals t = total(scores);
-  std::string line = t.tp + t.fn > 0
-                         ? fmt::format("{:<{}}  found {} of {}: {}   delay median {} mean {} max {} s", fault,
-                                       width, t.tp, t.tp + t.fn, named_counts(t), number(t.median_delay_s, 2),
-                                       number(t.mean_delay_s, 2), number(t.max_delay_s, 2))
-                         : fmt::format("{:<{}}  silent {} of {}", fault, width, t.tn, t.flights);
+  std::string line = fmt::format("{:<{}}", fault, width);
+  if (t.tp + t.fn > 0) {
+    line += fmt::format("  found {} of {}: {}   delay median {} mean {} max {} s", t.tp, t.tp + t.fn,
+                        named_counts(t), number(t.median_delay_s, 2), number(t.mean_delay_s, 2),
+                        number(t.max_delay_s, 2));
+  } else if (t.flights > 0) {
+    line += fmt::format("  silent {} of {}", t.tn, t.flights);
+  }
   if (t.not_judged > 0) line += fmt::format("   not judged {}", t.not_judged);
   return line + '\n';
 }
@@ -162,16 +178,9 @@ std::string to_table(const Evaluation& evaluation) {
     out += fmt::format("Alarms of the first {:g} s of a flight, and that time, do not count.\n",
                        to_seconds(evaluation.rules.warm_up));
   }
-  out += totals_line("first alarm decides", totals);
-  out += totals_line("0.5 s early allowed", total(evaluation.tolerant_scores));
-  out += fmt::format("of {} found: {}\n", totals.tp, named_counts(totals));
-  out += fmt::format(
-      "delay mean {} median {} max {} s   false alarms {} in {} h judged, of {} h healthy flight: {} "
-      "per hour judged (95 %: {} to {})\n\n",
-      number(totals.mean_delay_s, 2), number(totals.median_delay_s, 2), number(totals.max_delay_s, 2),
-      totals.false_alarms, number(totals.judged_healthy_h, 3), number(totals.healthy_h, 3),
-      number(totals.false_alarms_per_hour, 1), number(totals.false_alarms_per_hour_low, 1),
-      number(totals.false_alarms_per_hour_high, 1));
+  out +=
+      totals.flights > 0 ? totals_lines(totals, total(evaluation.tolerant_scores)) : "No flight is scored.\n";
+  out += '\n';
   const auto groups = by_fault(evaluation);
   for (const auto& [fault, scores] : groups) out += group_line(fault, truth_width, scores);
   return out;

@@ -85,7 +85,10 @@ class Eval(unittest.TestCase):
                 self.assertEqual((result["totals"]["tn"], result["totals"]["not_judged"]), (0, 1))
                 self.assertIsNone(result["totals"]["accuracy"])
                 self.assertIsNone(result["totals"]["false_alarms_per_hour"])
-                self.assertRegex(self.evaluate(detector, *wrong).stderr, "not judged: .*; the log has IMU of sensor 0, speeds of 4 rotors")
+                table = self.evaluate(detector, *wrong)
+                self.assertRegex(table.stderr, "not judged: .*; the log has IMU of sensor 0, speeds of 4 rotors")
+                self.assertIn("No flight is scored.", table.stdout)
+                self.assertRegex(table.stdout, r"none +not judged 1\n")
 
                 right = self.flight(detector, *arguments)
                 self.assertEqual(right["outcome"], "silent")
