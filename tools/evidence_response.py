@@ -99,7 +99,8 @@ def alfa(_):
                                                                  "--false-alarms-per-hour", rate))
                  for rate in ("0.1", "0.03", "0.01", "0.003", "0.001")]
     header = ["| method | input | TP | right | another | FP | FN | TN | not judged | precision | recall | accuracy "
-              "| within 10 s | delay median, mean, max s | false alarms per judged hour (95 %) |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|---|"]
+              "| within 10 s | delay median, mean, max s | false alarms per judged hour (95 %) |",
+              "|---|---|" + "--:|" * 11 + "---|---|"]
     kinds = {method: by_fault(result) for method, result in results["csv"].items()}
     kind_rows = [f"| {kind} | " + " | ".join(how_found(*kinds[method].get(kind, (0, 0, 0, []))) for method in kinds) + " |"
                  for kind in sorted(kinds["cold"])]
