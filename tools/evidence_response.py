@@ -235,7 +235,8 @@ def response_sets(_):
             totals = result["totals"]
             low, high = totals["false_alarms_per_hour_95"]
             alarms = sum(len(flight["alarms"]) for flight in result["flights"])
-            lift.append(f"| {set_name} | {len(logs)} | {alarms} | {totals['false_alarms']} in {totals['healthy_h']:.3f} h | "
+            lift.append(f"| {set_name} | {len(logs)} | {totals['not_judged']} | {alarms} | "
+                        f"{totals['false_alarms']} in {totals['judged_healthy_h']:.3f} h | "
                         f"{number(low, 0)} to {number(high, 0)} |")
     page("evidence_response_sets.md", [
         "# Response detector on other vehicles", "",
@@ -249,10 +250,12 @@ def response_sets(_):
         "| flight | fault | lasted | first alarm |", "|---|---|--:|---|", *faults, "",
         "## Simulated quadrotors losing rotor 1 (rflymad_sim)", "",
         "`config/response_multirotor.toml`: attitude errors against set-points. The axis is named; which rotor is for the",
-        "effectiveness detector to say.", "",
+        "effectiveness detector to say: all are candidates.", "",
         "| run | first alarm |", "|---|---|", *(f"| {flight['flight']} | {what_happened(flight)} |" for flight in rotor["flights"]),
         "", "## A pair of several inputs on healthy multirotors (real)", "",
         "`config/response_lift.toml`: vertical acceleration against the commands of all rotors. These sets carry no attitude",
         "set-point, so there is no attitude pair to try; bebop2_prop_eject has set-points of rates only, which no pair uses.",
-        "Violent throws of 6 to 25 s are not what a cold start of 10 s is for, and flights this short say little about hours.", "",
-        "| set | flights | alarms, any time | false alarms after 20 s | per hour, 95 % |", "|---|--:|--:|--:|---|", *lift])
+        "Violent throws of 6 to 25 s are not what a cold start of 10 s is for, and flights this short say little about hours.",
+        "Not judged are flights in which, after the 20 s that `airworthy eval` leaves out, nothing was: their silence says nothing.", "",
+        "| set | flights | not judged | alarms, any time | false alarms after 20 s, in the time judged | per hour, 95 % |",
+        "|---|--:|--:|--:|--:|---|", *lift])
