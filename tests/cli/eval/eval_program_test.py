@@ -44,7 +44,8 @@ class Eval(unittest.TestCase):
 
     def evaluate(self, detector, *arguments):
         name = detector[1] if detector else "response_multirotor"
-        return run(EVAL, *detector, "--config", CONFIG / f"{name}.toml", *arguments)
+        vehicle = of_vehicle("unbalance_medium") if detector else ()
+        return run(EVAL, *detector, "--config", CONFIG / f"{name}.toml", *vehicle, *arguments)
 
     def result(self, *arguments, code=0):
         done = self.evaluate(*arguments, "--json")
@@ -78,7 +79,7 @@ class Eval(unittest.TestCase):
     def test_what_nobody_judged_is_not_healthy(self):
         for detector in EFFECTIVENESS, UNBALANCE, ():
             with self.subTest(detector=detector):
-                arguments = (self.healthy, *(of_vehicle("unbalance_medium") if detector else ("--vehicle", "medium")))
+                arguments = (self.healthy, "--vehicle", "medium")
                 wrong = (*arguments, "--set", "input.imu_sensor_id=7")
                 result = self.result(detector, *wrong, code=66)
                 self.assertEqual(result["flights"][0]["outcome"], "not judged")
@@ -130,8 +131,8 @@ class Eval(unittest.TestCase):
         for detector in EFFECTIVENESS, UNBALANCE:
             done = run(CALIBRATE, detector[1], "--config", CONFIG / f"{detector[1]}.toml", *vehicle, whole, "-o", calibration)
             self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual(self.flight(detector, *vehicle, self.healthy, "--calibration", calibration)["outcome"], "silent")
-        done = self.evaluate(EFFECTIVENESS, *vehicle, self.healthy, "--calibration", calibration)
+            self.assertEqual(self.flight(detector, self.healthy, "--calibration", calibration)["outcome"], "silent")
+        done = self.evaluate(EFFECTIVENESS, self.healthy, "--calibration", calibration)
         self.assertEqual(done.returncode, 78, "that of the unbalance")
         self.assertIn(str(calibration), done.stderr)
 
