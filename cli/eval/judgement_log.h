@@ -26,13 +26,18 @@ class JudgementLog {
   /// Whether the detector tells at all.
   [[nodiscard]] bool has_any() const { return has_any_; }
   [[nodiscard]] double judged_s() const { return judged_s_; }
+  /// The part of it in this interval.
+  [[nodiscard]] double judged_s(const Interval& within) const;
   [[nodiscard]] double muted_s() const;
   /// By cause, in the order in which they first came up.
   [[nodiscard]] const std::vector<Muted>& muted() const { return muted_; }
+  /// The cause that took the most time; empty if there is none.
+  [[nodiscard]] std::string main_cause() const;
 
  private:
   bool has_any_ = false;
   double judged_s_ = 0.0;
+  std::vector<Interval> judged_;  ///< neighbours joined, in order of time
   std::vector<Muted> muted_;
 };
 

@@ -6,14 +6,17 @@
 
 namespace airworthy::eval {
 
-std::vector<rt::Expected<Flight>> run_nested(const std::vector<std::string>& logs,
+std::vector<rt::Expected<Flight>> run_nested(const std::vector<std::string>& logs, const std::string& vehicle,
                                              const response::ResponseConfig& config,
                                              const calibrate::FlightName& flight_name,
                                              const calibrate::LearningParams& learning) {
   std::vector<rt::Expected<calibrate::HealthyFlight>> healthy(logs.size());
   calibrate::for_each_parallel(logs.size(), learning.jobs, [&](std::size_t i) {
     healthy[i] = calibrate::read_healthy_flight(logs[i], config);
-    if (healthy[i]) healthy[i]->group = flight_name.of(healthy[i]->name);
+    if (!healthy[i]) return;
+    healthy[i]->group = flight_name.of(healthy[i]->name);
+    const auto checked = check_vehicle(logs[i], healthy[i]->vehicle, vehicle);
+    if (!checked) healthy[i] = tl::unexpected<rt::Error>{checked.error()};
   });
   std::vector<rt::Expected<Flight>> flights(logs.size());
   calibrate::LearningParams one_thread = learning;

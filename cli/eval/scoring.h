@@ -1,68 +1,69 @@
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "cli/eval/judgement_log.h"
-#include "core/time/time.h"
+#include "cli/eval/concern.h"
+#include "cli/eval/flight.h"
 
 namespace airworthy::eval {
 
-/// A fault raised by a detector.
-struct Alarm {
-  TimePoint time;   ///< the sample that decided
-  TimePoint onset;  ///< as the detector estimates it
-  std::string component;
-  std::string fault_kind;
-  double magnitude = std::numeric_limits<double>::quiet_NaN();  ///< in the unit of its kind
-};
-
-/// What really happened in a flight.
-struct Truth {
-  std::string component;
-  std::string fault_kind;          ///< none = healthy
-  std::optional<TimePoint> onset;  ///< empty = healthy
-};
-
-/// One flight as the detectors saw it.
-struct Flight {
-  std::string name;
-  std::string vehicle;
-  std::optional<Truth> truth;  ///< empty = not known: shown, never scored
-  TimePoint start;
-  TimePoint end;
-  std::vector<Alarm> alarms;  ///< in order of time
-  JudgementLog judgement;
-};
-
 struct Rules {
-  Duration warm_up{20'000'000};  ///< alarms so early in a flight, and that time, do not count
-  Duration onset_tolerance{0};   ///< an alarm so long before the onset still counts as finding the fault
-  Duration rearm{5'000'000};     ///< alarms closer together are one false alarm
+  std::string detector = "response";  ///< only what it watches is to be found
+  Duration warm_up{20'000'000};       ///< alarms so early in a flight, and that time, do not count
+  Duration onset_tolerance{0};        ///< an alarm so long before the onset still counts as finding the fault
+  Duration aftermath{10'000'000};     ///< an alarm so long after the end of a fault is still its alarm
+  Duration rearm{5'000'000};          ///< alarms closer together are one false alarm
 };
 
-enum class Outcome { kTruePositive, kFalseNegative, kTrueNegative, kFalsePositive, kEarly, kUnscored };
+enum class Outcome {
+  kTruePositive,
+  kFalseNegative,
+  kTrueNegative,
+  kFalsePositive,
+  kEarly,
+  kNotJudged,
+  kUnscored
+};
 
-/// The verdict on one flight: its first alarm decides. kEarly, an alarm before the onset, is both a false
-/// positive and a miss.
+/// What became of one fault of a flight.
+struct FaultScore {
+  Truth fault;
+  bool is_watched = false;
+  bool is_reached = false;        ///< it begins before the recording ends
+  std::optional<double> named_s;  ///< from its onset until the first alarm that names it right
+
+  [[nodiscard]] bool counts() const { return is_watched && is_reached; }
+};
+
+/// The verdict on one flight, for the faults that the detector watches: its first alarm decides. kEarly, an alarm
+/// while there is no such fault though there is one in the flight, is both a false positive and a miss. A flight
+/// without such a fault is a healthy one.
 struct Score {
   Outcome outcome = Outcome::kUnscored;
-  std::optional<Alarm> first;  ///< the alarm that decided
-  double delay_s = 0;          ///< of a true positive, from the onset
-  double healthy_s = 0;        ///< time scored for false alarms: healthy flight, or before the onset
-  int false_alarms = 0;        ///< in healthy_s
+  std::optional<Alarm> first;     ///< the alarm that decided
+  Named named = Named::kAnother;  ///< of a true positive: what it names, of the faults that are there
+  double delay_s = 0;    ///< of a true positive, from the onset of the fault it names, else of the first
+  double judged_s = 0;   ///< after the warm-up
+  double healthy_s = 0;  ///< flight after the warm-up without a fault to find
+  double judged_healthy_s = 0;     ///< of it judged: what false alarms are counted in
+  int false_alarms = 0;            ///< in healthy_s
+  std::vector<FaultScore> faults;  ///< all that the truth names
 };
 
 [[nodiscard]] Score score(const Flight& flight, const Rules& rules);
 
 struct Totals {
-  int flights = 0;
+  int flights = 0;  ///< scored; those that were not judged are apart
+  int not_judged = 0;
   int tp = 0;
   int fp = 0;
   int fn = 0;
   int tn = 0;
+  int named_right = 0;    ///< of tp
+  int named_among = 0;    ///< of tp: the failed part is one of several candidates
+  int named_another = 0;  ///< of tp
   int found_within_10_s = 0;
   double precision = 0;
   double recall = 0;
@@ -72,7 +73,8 @@ struct Totals {
   double max_delay_s = 0;
   int false_alarms = 0;
   double healthy_h = 0;
-  double false_alarms_per_hour = 0;
+  double judged_healthy_h = 0;
+  double false_alarms_per_hour = 0;      ///< of judged_healthy_h
   double false_alarms_per_hour_low = 0;  ///< exact 95 % Poisson interval
   double false_alarms_per_hour_high = 0;
 };

@@ -48,7 +48,7 @@ class Calibrate(unittest.TestCase):
                    "-o", output, *options, *self.logs(flights))
 
     def evaluate(self, *options, flights):
-        done = run(EVAL, "--json", "--config", CONFIG / "response.toml", *options, *self.logs(flights))
+        done = run(EVAL, "--json", "--config", CONFIG / "response.toml", "--vehicle", "alfa", *options, *self.logs(flights))
         self.assertEqual(done.returncode, 0, done.stderr)
         return {row["flight"]: row for row in json.loads(done.stdout)["flights"]}
 
@@ -101,7 +101,8 @@ class Calibrate(unittest.TestCase):
         calibration = self.folder / "renamed.toml"
         self.assertEqual(self.calibrate(calibration).returncode, 0)
         calibration.write_text(calibration.read_text().replace('vehicle = "alfa"', 'vehicle = "other"'))
-        done = run(EVAL, "--config", CONFIG / "response.toml", "--calibration", calibration, *self.logs(TRIED_ON[:1]))
+        done = run(EVAL, "--config", CONFIG / "response.toml", "--vehicle", "alfa", "--calibration", calibration,
+                   *self.logs(TRIED_ON[:1]))
         self.assertEqual(done.returncode, 65)
         self.assertIn('of vehicle "alfa", but the calibration is of "other"', done.stderr)
 

@@ -36,7 +36,8 @@ class CsvAndMavlink(unittest.TestCase):
             run(CALIBRATE, "--config", CONFIG / "response.toml", "--vehicle", "alfa", "--flight-name", FLIGHT, "-o",
                 folder / "alfa.toml", *csv)
             rows = {source: {row["flight"]: row for row in json.loads(run(
-                        EVAL, "--json", "--config", CONFIG / "response.toml", "--calibration", folder / "alfa.toml", *logs))["flights"]}
+                        EVAL, "--json", "--config", CONFIG / "response.toml", "--vehicle", "alfa",
+                        "--calibration", folder / "alfa.toml", *logs))["flights"]}
                     for source, logs in (("csv", csv), ("mavlink", mavlink))}
         self.assertEqual(len(rows["csv"]), len(flights))
         differences = []

@@ -28,6 +28,19 @@ TEST(JudgementLog, AddsUpByCauseAndJoinsNeighbours) {
   EXPECT_EQ(log.muted()[1].intervals[0].from, at(3.0));
 }
 
+TEST(JudgementLog, KnowsWhatOfAnIntervalWasJudgedAndWhatMutedItMost) {
+  JudgementLog log;
+  EXPECT_EQ(log.main_cause(), "");
+  log.note(at(0.0), at(1.0), "on ground");
+  log.note(at(1.0), at(3.0), "");
+  log.note(at(3.0), at(5.0), "pushed");
+  log.note(at(5.0), at(6.0), "");
+  EXPECT_DOUBLE_EQ(log.judged_s({at(0.0), at(9.0)}), 3.0);
+  EXPECT_DOUBLE_EQ(log.judged_s({at(2.0), at(5.5)}), 1.5);
+  EXPECT_DOUBLE_EQ(log.judged_s({at(3.5), at(4.5)}), 0.0);
+  EXPECT_EQ(log.main_cause(), "pushed");
+}
+
 TEST(JudgementLog, TheTableListsTheMutedSeconds) {
   Evaluation evaluation;
   Flight flight;
@@ -40,6 +53,13 @@ TEST(JudgementLog, TheTableListsTheMutedSeconds) {
   EXPECT_EQ(to_muted_table(evaluation),
             "flight: judged 1.50 s, muted 0.50 s\n"
             "      0.50 s  on ground: 0.00-0.50\n");
+  JudgementLog rotor;
+  rotor.note(at(0.0), at(1.5), "frozen");
+  evaluation.flights[0].components.emplace("rotor 1", rotor);
+  EXPECT_EQ(to_muted_table(evaluation),
+            "flight: judged 1.50 s, muted 0.50 s\n"
+            "      0.50 s  on ground: 0.00-0.50\n"
+            "  rotor 1: judged 0.00 s, longest not: frozen\n");
 }
 
 }  // namespace

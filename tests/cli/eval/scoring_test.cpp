@@ -11,16 +11,32 @@ constexpr double kStart_s = 1000;
 
 TimePoint at(double seconds) { return from_us(0) + from_seconds(kStart_s + seconds); }
 
+Alarm alarm(double time_s, const std::string& component = "engine", const std::string& kind = "thrust_loss") {
+  return {at(time_s), at(time_s), component, kind, 0.0, {}};
+}
+
+void add_fault(Flight& flight, const std::string& component, const std::string& kind, double onset_s,
+               std::optional<double> end_s = std::nullopt) {
+  Truth fault{component, kind, at(onset_s), std::nullopt};
+  if (end_s) fault.end = at(*end_s);
+  if (!flight.truth || !flight.truth->onset) flight.truth = fault;
+  flight.faults.push_back(fault);
+}
+
+/// Judged from begin to end.
 Flight flight(std::optional<double> onset_s, std::vector<double> alarms_s, double duration_s = 120) {
   Flight flight;
   flight.name = "f";
-  flight.truth = Truth{"engine", onset_s ? "thrust_loss" : "none", std::nullopt};
-  if (onset_s) flight.truth->onset = at(*onset_s);
+  flight.truth = Truth{"", "none", std::nullopt, std::nullopt};
+  if (onset_s) add_fault(flight, "engine", "thrust_loss", *onset_s);
   flight.start = at(0);
   flight.end = at(duration_s);
-  for (const double t : alarms_s) flight.alarms.push_back({at(t), at(t), "engine", "thrust_loss"});
+  for (const double t : alarms_s) flight.alarms.push_back(alarm(t));
+  flight.judgement.note(flight.start, flight.end, "");
   return flight;
 }
+
+Rules of(const std::string& detector) { return {.detector = detector, .warm_up = Duration{0}}; }
 
 TEST(Score, TheFirstAlarmDecides) {
   EXPECT_EQ(score(flight(60, {61.5, 70}), {}).outcome, Outcome::kTruePositive);
@@ -56,6 +72,124 @@ TEST(Score, WithoutTruthNothingIsScored) {
   unknown.truth.reset();
   EXPECT_EQ(score(unknown, {}).outcome, Outcome::kUnscored);
   EXPECT_EQ(total({score(unknown, {})}).flights, 0);
+}
+
+TEST(Score, FoundSaysWhetherTheFailedPartIsNamed) {
+  Flight one = flight(60, {});
+  one.alarms = {alarm(61, "pitch control", "control_effectiveness_loss"), alarm(65)};
+  const Score other = score(one, {});
+  EXPECT_EQ(other.outcome, Outcome::kTruePositive);
+  EXPECT_EQ(other.named, Named::kAnother);
+  EXPECT_NEAR(other.delay_s, 1.0, 1e-6);
+  ASSERT_EQ(other.faults.size(), 1U);
+  EXPECT_NEAR(other.faults[0].named_s.value_or(0), 5.0, 1e-6) << "the second alarm names it";
+  EXPECT_EQ(score(flight(60, {61}), {}).named, Named::kRight);
+}
+
+TEST(Score, ARotorBlamedForAFrozenGyroIsAFalseAlarm) {
+  Flight one = flight(std::nullopt, {});
+  add_fault(one, "imu", "gyro_freeze", 30);
+  EXPECT_EQ(score(one, of("effectiveness")).outcome, Outcome::kTrueNegative);
+  one.alarms = {alarm(30.08, "rotor 3", "partial_loss")};
+  const Score blamed = score(one, of("effectiveness"));
+  EXPECT_EQ(blamed.outcome, Outcome::kFalsePositive);
+  EXPECT_EQ(blamed.false_alarms, 1);
+  EXPECT_NEAR(blamed.healthy_s, 120, 1e-6);
+}
+
+TEST(Score, OfSeveralFaultsThoseThatTheDetectorWatchesCount) {
+  Flight one = flight(std::nullopt, {});
+  add_fault(one, "rotor 2", "unbalance", 10);
+  add_fault(one, "rotor 3", "propeller_lost", 60);
+  one.alarms = {alarm(61, "rotor 3", "propeller_lost")};
+  const Score right = score(one, of("effectiveness"));
+  EXPECT_EQ(right.outcome, Outcome::kTruePositive);
+  EXPECT_EQ(right.named, Named::kRight);
+  EXPECT_NEAR(right.delay_s, 1.0, 1e-6);
+  EXPECT_NEAR(right.healthy_s, 60, 1e-6);
+  one.alarms = {alarm(30, "rotor 2", "partial_loss")};
+  EXPECT_EQ(score(one, of("effectiveness")).outcome, Outcome::kEarly);
+  one.alarms = {alarm(30, "rotor 2", "unbalance")};
+  EXPECT_EQ(score(one, of("unbalance")).outcome, Outcome::kTruePositive);
+}
+
+TEST(Score, TheDelayIsFromTheFaultThatIsNamed) {
+  Flight one = flight(std::nullopt, {});
+  add_fault(one, "rotor 1", "partial_loss", 20);
+  add_fault(one, "rotor 2", "partial_loss", 60);
+  one.alarms = {alarm(61, "rotor 2", "partial_loss")};
+  const Score second = score(one, of("effectiveness"));
+  EXPECT_EQ(second.named, Named::kRight);
+  EXPECT_NEAR(second.delay_s, 1.0, 1e-6);
+  EXPECT_FALSE(second.faults[0].named_s);
+  EXPECT_TRUE(second.faults[1].named_s);
+  one.alarms = {alarm(61, "rotor 4", "partial_loss")};
+  EXPECT_EQ(score(one, of("effectiveness")).named, Named::kAnother);
+  EXPECT_NEAR(score(one, of("effectiveness")).delay_s, 41.0, 1e-6);
+}
+
+TEST(Score, AfterTheEndOfAFaultTheFlightIsHealthyAgain) {
+  Flight one = flight(std::nullopt, {});
+  add_fault(one, "left elevon", "loss_of_effectiveness", 30, 40);
+  add_fault(one, "right elevon", "loss_of_effectiveness", 80, 90);
+  EXPECT_NEAR(score(one, {}).healthy_s, 10 + 30 + 20, 1e-6) << "20 to 30, 50 to 80, 100 to 120";
+  one.alarms = {alarm(49, "roll control")};
+  EXPECT_EQ(score(one, {}).outcome, Outcome::kTruePositive);
+  one.alarms = {alarm(60, "roll control")};
+  EXPECT_EQ(score(one, {}).outcome, Outcome::kEarly);
+  EXPECT_EQ(score(one, {}).false_alarms, 1);
+}
+
+TEST(Score, AFaultAfterTheEndOfTheLogIsNotMissed) {
+  const Score unreached = score(flight(130, {}), {});
+  EXPECT_EQ(unreached.outcome, Outcome::kTrueNegative);
+  ASSERT_EQ(unreached.faults.size(), 1U);
+  EXPECT_FALSE(unreached.faults[0].is_reached);
+  EXPECT_EQ(score(flight(130, {100}), {}).outcome, Outcome::kFalsePositive);
+}
+
+TEST(Score, WhatNobodyJudgedIsNeitherSilentNorMissed) {
+  for (const auto& onset : {std::optional<double>{}, std::optional<double>{60}}) {
+    Flight one = flight(onset, {});
+    one.judgement = {};
+    EXPECT_EQ(score(one, {}).outcome, Outcome::kNotJudged) << "it does not tell";
+    one.judgement.note(one.start, one.end, "no inertial data yet");
+    EXPECT_EQ(score(one, {}).outcome, Outcome::kNotJudged);
+    one.judgement.note(at(19), at(20), "");
+    EXPECT_EQ(score(one, {}).outcome, Outcome::kNotJudged) << "in the warm-up only";
+  }
+}
+
+TEST(Score, FalseAlarmsAreCountedInJudgedTime) {
+  Flight one = flight(80, {30});
+  one.judgement = {};
+  one.judgement.note(at(0), at(50), "");
+  one.judgement.note(at(50), at(70), "stale");
+  one.judgement.note(at(70), at(120), "");
+  const Score early = score(one, {});
+  EXPECT_NEAR(early.judged_s, 80, 1e-6);
+  EXPECT_NEAR(early.healthy_s, 60, 1e-6);
+  EXPECT_NEAR(early.judged_healthy_s, 40, 1e-6) << "20 to 50, 70 to 80";
+  EXPECT_NEAR(total({early}).false_alarms_per_hour, 3600.0 / 40, 1e-6);
+}
+
+TEST(Total, CountsNamesAndWhatWasNotJudgedApart) {
+  Flight wrong = flight(60, {});
+  wrong.alarms = {alarm(61, "pitch control")};
+  Flight among = flight(60, {});
+  among.alarms = {alarm(61, "propulsion")};
+  among.alarms[0].candidates = {"engine", "propeller"};
+  Flight unjudged = flight(std::nullopt, {});
+  unjudged.judgement = {};
+  const Totals t =
+      total({score(flight(60, {61}), {}), score(wrong, {}), score(among, {}), score(unjudged, {})});
+  EXPECT_EQ(t.tp, 3);
+  EXPECT_EQ(t.named_right, 1);
+  EXPECT_EQ(t.named_among, 1);
+  EXPECT_EQ(t.named_another, 1);
+  EXPECT_EQ(t.not_judged, 1);
+  EXPECT_EQ(t.tn, 0);
+  EXPECT_EQ(t.flights, 3);
 }
 
 TEST(Total, AnEarlyAlarmIsBothAFalsePositiveAndAMiss) {
