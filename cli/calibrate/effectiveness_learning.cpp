@@ -497,6 +497,7 @@ rt::Expected<Calibration> learn_effectiveness(const std::vector<Recording>& reco
   params.learns_inertial_delay = false;
   Calibration calibration;
   calibration.vehicle = config.vehicle;
+  calibration.vehicle_hash = config.vehicle_hash;
   calibration.flights = static_cast<int>(flights.size());
   const auto lacks_speeds = [](const Recording& flight) { return flight.speeds.empty(); };
   const bool is_unheard = std::all_of(flights.begin(), flights.end(), lacks_speeds);

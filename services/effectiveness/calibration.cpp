@@ -20,6 +20,7 @@ rt::Expected<Calibration> load_calibration(const std::string& path) {
   ConfigTable root = file.root();
   Calibration calibration;
   calibration.vehicle = root.required<std::string>("vehicle");
+  calibration.vehicle_hash = root.required<std::string>("vehicle_hash");
   calibration.flights = root.optional<int>("flights", 0);
   calibration.used_s = root.optional<double>("used_s", 0.0);
   calibration.speeds_are_commanded = root.optional<bool>("speeds_are_commanded", false);
@@ -62,6 +63,7 @@ std::string to_toml(const Calibration& calibration) {
       "# `airworthy calibrate effectiveness`; learn it again after propellers, motors or payload have "
       "changed.\n\n"
       "vehicle = \"{}\"\n"
+      "vehicle_hash = \"{}\"   # of the vehicle file: what is learned is in relation to it\n"
       "flights = {}\n"
       "used_s = {:.1f}                  # of flight that was used\n"
       "speeds_are_commanded = {}        # true: no rotor reported its speed, all below follows from "
@@ -72,9 +74,10 @@ std::string to_toml(const Calibration& calibration) {
       "gyro_noise_rad_s = {:.4g}        # of one sample against the model\n"
       "accel_noise_m_s2 = {:.4g}\n"
       "smallest_loss_ratio = {:.2g}     # of one rotor's thrust that is found within a second\n",
-      calibration.vehicle, calibration.flights, calibration.used_s, calibration.speeds_are_commanded,
-      calibration.motor_time_constant_s, calibration.command_latency_s, calibration.telemetry_latency_s,
-      calibration.gyro_noise_rad_s, calibration.accel_noise_m_s2, calibration.smallest_loss_ratio);
+      calibration.vehicle, calibration.vehicle_hash, calibration.flights, calibration.used_s,
+      calibration.speeds_are_commanded, calibration.motor_time_constant_s, calibration.command_latency_s,
+      calibration.telemetry_latency_s, calibration.gyro_noise_rad_s, calibration.accel_noise_m_s2,
+      calibration.smallest_loss_ratio);
   for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
     const Calibration::Axis& axis = calibration.axis[i];
     text += fmt::format(

@@ -20,7 +20,8 @@ struct Calibration {
   };
 
   std::string vehicle;
-  std::string hash;  ///< of the file it was read from
+  std::string vehicle_hash;  ///< of the content of the vehicle file it was learned with
+  std::string hash;          ///< of the file it was read from
   int flights = 0;
   double used_s = 0.0;
   std::array<Axis, 3> axis;            ///< roll, pitch, vertical

@@ -13,6 +13,7 @@ using rt::ConfigTable;
 using rt::Range;
 
 constexpr double kSecondsPerMs = 1e-3;
+constexpr int kMostWaiting = 60;
 constexpr double kMostRateOfDelay_Hz =
     1000.0;  // samples wait for the speeds of their delay: the detector holds 64
 
@@ -32,6 +33,13 @@ void read_input(ConfigTable table, EffectivenessConfig& config) {
                {"inertial_delay_learned"});
   }
   config.monitor.most_wait = milliseconds("most_wait_ms", 20.0, 100.0);
+  const double most_waiting = to_seconds(config.monitor.most_wait) * config.monitor.samples_per_s;
+  if (most_waiting > kMostWaiting) {
+    table.fail("most_wait_ms",
+               fmt::format("at imu_rate_Hz = {:g} that is {:.0f} samples; the detector holds {}",
+                           config.monitor.samples_per_s, most_waiting, kMostWaiting),
+               {"imu_rate_Hz"});
+  }
   config.monitor.mapping_is_known = table.optional<bool>("rotor_mapping_checked", false);
 }
 
@@ -69,10 +77,16 @@ void read_policy(ConfigTable table, EffectivenessParams& params) {
   }
 }
 
-void read_calibration(const ConfigTable& root, bool opens_it, EffectivenessConfig& config) {
+void read_calibration(ConfigTable root, bool opens_it, EffectivenessConfig& config) {
   if (!root.has("calibration")) return;
   const auto calibration = rt::named_calibration(root, config.vehicle, opens_it, load_calibration);
   if (!calibration) return;
+  if (calibration->vehicle_hash != config.vehicle_hash) {
+    return root.fail("calibration",
+                     fmt::format("was learned with another content of the file of vehicle \"{}\": "
+                                 "calibrate again",
+                                 config.vehicle));
+  }
   config.monitor = with_calibration(config.monitor, *calibration);
   config.is_calibrated = true;
 }
@@ -96,6 +110,7 @@ rt::Expected<EffectivenessConfig> load_file(const std::string& path,
   EffectivenessConfig config;
   const rt::VehicleFile vehicle = rt::VehicleFile::named_by(root);
   config.vehicle = vehicle.name;
+  config.vehicle_hash = vehicle.hash;
   use_vehicle(root, vehicle, config.monitor);
   read_input(root.table("input"), config);
   read_model(root.table("model"), config.monitor.noise);

@@ -10,6 +10,7 @@ namespace airworthy::effectiveness {
 
 struct EffectivenessConfig {
   std::string vehicle;
+  std::string vehicle_hash;  ///< of the content of its file
   std::string hash;
   int imu_sensor_id = 0;
   EffectivenessParams monitor;

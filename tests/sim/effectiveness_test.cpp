@@ -162,9 +162,28 @@ TEST(Effectiveness, FindsAWrongPropellerThatWasMountedOnTheGround) {
 TEST(Effectiveness, ASuddenExcessIsNotTheLossOfAnother) {
   for (const char* name : {"unbalance_medium", "unbalance_hexa", "f450"}) {
     const auto outcome = fly_with_excess(name, 12, 0.3, 10.0);
-    ASSERT_FALSE(outcome.ours.empty()) << name;
-    EXPECT_EQ(outcome.ours.front().rotor, 1U) << name;
-    EXPECT_EQ(outcome.ours.front().kind, effectiveness::LossKind::kOverEffective) << name;
+    for (const Said& said : outcome.ours) {
+      EXPECT_EQ(said.rotor, 1U) << name;
+      EXPECT_EQ(said.kind, effectiveness::LossKind::kOverEffective) << name;
+    }
+  }
+}
+
+// What was lost and comes back is no loss of the opposite rotor.
+TEST(Effectiveness, ALossThatComesBackIsOfTheSameRotor) {
+  for (const char* name : {"unbalance_medium", "unbalance_hexa", "f450", "octo"}) {
+    EffectivenessFlight flight = flight_of(name, 21, Manoeuvre::kRandom);
+    flight.fault =
+        Fault{.kind = FaultKind::kPartialLoss, .onset_s = 9.0, .end_s = 13.0, .rotor = 3, .magnitude = 0.3};
+    flight.duration_s = 20.0;
+    flight.give_up_s = 8.0;
+    const auto outcome = fly(flight, effectiveness_params(flight.vehicle));
+    ASSERT_GE(outcome.ours.size(), 2U) << name;
+    for (const Said& said : outcome.ours) {
+      EXPECT_EQ(said.rotor, 2U) << name << " at " << said.time_s;
+      EXPECT_EQ(said.kind, effectiveness::LossKind::kPartialLoss) << name;
+    }
+    EXPECT_NEAR(outcome.ours.back().effectiveness, 1.0, 0.15) << name;
   }
 }
 

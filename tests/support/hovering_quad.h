@@ -60,6 +60,12 @@ class HoveringQuad {
   /// White noise of this standard deviation.
   double noise(double sigma) { return sigma * normal_(random_); }
 
+  /// Level and at rest again.
+  void settle() {
+    rate_rad_s_ = {};
+    angle_rad_ = {};
+  }
+
   /// Roll and pitch acceleration in the step.
   [[nodiscard]] const std::array<double, 2>& turning_rad_s2() const { return turning_rad_s2_; }
 

@@ -46,7 +46,8 @@ constexpr Duration kLeastAge{4'000};    // of the evidence: a blow shows within 
 constexpr double kSurelyPartial = 0.5;  // effectiveness that no lost propeller shows ...
 constexpr Duration kEarliestPartial{15'000};  // ... after so long
 constexpr double kLeastLeft = 0.1;            // of a rotor that may yet come back
-constexpr double kCautious = 2.0;             // times the threshold near the ground
+constexpr Duration kRepair{10'000'000};
+constexpr double kCautious = 2.0;  // times the threshold near the ground
 
 std::array<LossRange<double>, kLossRanges> ranges_of(const EffectivenessParams& params) {
   return {LossRange<double>{kLeastFullLoss, kFullLoss, kQuickMemory_s},
@@ -200,7 +201,7 @@ void EffectivenessMonitor::start_over(TimePoint time) noexcept {
   delayed_count_ = 0;
   delay_added_.reset();
   delay_.interrupt();
-  for (std::optional<TimePoint>* since : {&in_flight_since_, &source_since_, &struck_}) {
+  for (std::optional<TimePoint>* since : {&in_flight_since_, &source_since_, &struck_, &on_ground_since_}) {
     if (*since && **since > time) *since = time;
   }
   gyro_changed_ = accel_changed_ = time;
@@ -329,7 +330,24 @@ bool EffectivenessMonitor::is_blow(const MotionSample<double>& motion) const noe
          exceeds(motion.vertical, kBlow * all[2]);
 }
 
+// After so long on the ground the rotor may have been repaired: the next flight begins without what was found.
+void EffectivenessMonitor::watch_ground(const Inertial& sample) noexcept {
+  if (sample.phase != Phase::kOnGround) {
+    on_ground_since_.reset();
+    return;
+  }
+  if (!on_ground_since_) on_ground_since_ = sample.time;
+  if (sample.time - *on_ground_since_ < kRepair) return;
+  lost_.reset();
+  for (std::size_t i = 0; i < params_.vehicle.rotor_count; ++i) {
+    if (!has_lost(i)) continue;
+    set_effectiveness(i, 1.0);
+    slow_.believe(i, 1.0);
+  }
+}
+
 Muted EffectivenessMonitor::reason(const Inertial& sample) noexcept {
+  watch_ground(sample);
   if (lost_) return Muted::kRotorLost;
   // Where the autopilot is sure to be in the air, signs of the ground may be an updraught: a lost rotor is
   // still looked for.

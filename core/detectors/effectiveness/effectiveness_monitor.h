@@ -202,6 +202,7 @@ class EffectivenessMonitor {
   [[nodiscard]] bool come_too_late() const noexcept;
   std::optional<LossEvent> process(TimePoint now) noexcept;
   std::optional<LossEvent> step(const Inertial& sample, TimePoint now) noexcept;
+  void watch_ground(const Inertial& sample) noexcept;
   [[nodiscard]] Muted reason(const Inertial& sample) noexcept;
   [[nodiscard]] bool is_blow(const MotionSample<double>& motion) const noexcept;
   std::optional<LossEvent> judge(const Inertial& sample, double dt_s, TimePoint now) noexcept;
@@ -257,6 +258,7 @@ class EffectivenessMonitor {
   std::optional<TimePoint> last_processed_;
   TimePoint last_stamp_{};  ///< of the same sample
   std::optional<TimePoint> in_flight_since_;
+  std::optional<TimePoint> on_ground_since_;
   std::optional<TimePoint> source_since_;  ///< speeds come from commands alone, or no longer do
   std::optional<std::size_t> lost_;
   std::array<LateralForce, 2> lateral_;

@@ -27,6 +27,9 @@ class EffectivenessConfigTest : public ::testing::Test {
     return EffectivenessConfig::load((folder_.path() / "effectiveness.toml").string(), {});
   }
 
+  [[nodiscard]] std::string vehicle_hash() const {
+    return load("vehicle = \"vehicle.toml\"\n[policy]\nfalse_alarms_per_hour = 1e-4\n")->vehicle_hash;
+  }
   // The error text with the folder taken out.
   [[nodiscard]] std::string error_of(const std::string& text) const {
     const auto config = load(text);
@@ -44,9 +47,10 @@ class EffectivenessConfigTest : public ::testing::Test {
 
 constexpr const char* kPolicy = "[policy]\nfalse_alarms_per_hour = 1e-4\n";
 
-Calibration learned() {
+Calibration learned(const std::string& vehicle_hash) {
   Calibration calibration;
   calibration.vehicle = "medium";
+  calibration.vehicle_hash = vehicle_hash;
   calibration.flights = 2;
   calibration.used_s = 80.0;
   calibration.axis = {{{0.5, 0.01, 0.9}, {1.5, 0.02, 0.8}, {1.25, 0.005, 0.7}}};
@@ -92,7 +96,7 @@ TEST_F(EffectivenessConfigTest, EveryProblemIsReportedAtOnce) {
 }
 
 TEST_F(EffectivenessConfigTest, ACalibrationComesBackAsItWasWritten) {
-  write("calibration.toml", to_toml(learned()));
+  write("calibration.toml", to_toml(learned(vehicle_hash())));
   const auto plain = load("vehicle = \"vehicle.toml\"\n" + std::string{kPolicy});
   const auto config =
       load("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n" + std::string{kPolicy});
@@ -122,12 +126,12 @@ TEST_F(EffectivenessConfigTest, ACalibrationShowsTheNumberingOnlyWhereRollAndPit
     return config && config->monitor.mapping_is_known;
   };
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Calibration one = learned();
+    Calibration one = learned(vehicle_hash());
     one.axis[axis].is_excited = false;
     EXPECT_EQ(is_known(to_toml(one)), axis == 2) << axis;
     EXPECT_TRUE(is_known(to_toml(one), "[input]\nrotor_mapping_checked = true\n")) << axis;
   }
-  std::string unsaid = to_toml(learned());
+  std::string unsaid = to_toml(learned(vehicle_hash()));
   for (std::size_t at = unsaid.find("excited = true"); at != std::string::npos;
        at = unsaid.find("excited = true"))
     unsaid.erase(at, std::string{"excited = true"}.size());
@@ -146,12 +150,29 @@ TEST_F(EffectivenessConfigTest, TheInertialDelayIsLearnedOfAtMost1000SamplesASec
 }
 
 TEST_F(EffectivenessConfigTest, ACalibrationOfAnotherVehicleIsRefused) {
-  Calibration other = learned();
+  Calibration other = learned(vehicle_hash());
   other.vehicle = "small";
   write("calibration.toml", to_toml(other));
   EXPECT_EQ(
       error_of("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n" + std::string{kPolicy}),
       "effectiveness.toml:2:1: calibration: is of vehicle \"small\", not of \"medium\"");
+}
+
+TEST_F(EffectivenessConfigTest, ACalibrationWithAnotherContentOfTheVehicleFileIsRefused) {
+  const std::string config = "vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n";
+  write("calibration.toml", to_toml(learned("0123456789abcdef")));
+  EXPECT_EQ(error_of(config + kPolicy),
+            "effectiveness.toml:2:1: calibration: was learned with another content of the file of vehicle "
+            "\"medium\": calibrate again");
+}
+
+TEST_F(EffectivenessConfigTest, NoMoreSamplesMayWaitThanTheDetectorHolds) {
+  const std::string vehicle = "vehicle = \"vehicle.toml\"\n";
+  EXPECT_EQ(
+      error_of(vehicle + "[input]\nimu_rate_Hz = 4000\n" + kPolicy),
+      "effectiveness.toml:2:1: input.most_wait_ms: at imu_rate_Hz = 4000 that is 80 samples; the detector "
+      "holds 60");
+  EXPECT_TRUE(load(vehicle + "[input]\nimu_rate_Hz = 4000\nmost_wait_ms = 15\n" + kPolicy).has_value());
 }
 
 }  // namespace

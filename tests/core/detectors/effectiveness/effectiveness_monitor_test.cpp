@@ -396,6 +396,31 @@ TEST(EffectivenessMonitor, AClockThatJumpsForwardBlamesNobody) {
   }
 }
 
+TEST(EffectivenessMonitor, AfterARepairEveryRotorIsJudgedAgain) {
+  for (const double left : {0.0, 0.5}) {
+    Hover hover;
+    hover.fly(5.0);
+    hover.effectiveness[1] = left;
+    ASSERT_FALSE(said_within(hover, 2.0).empty());
+    hover.phase = Phase::kOnGround;
+    hover.effectiveness[1] = 1.0;
+    hover.settle();
+    hover.fly(9.0);
+    EXPECT_NEAR(hover.monitor.effectiveness(1), left, 0.1) << "not yet";
+    hover.fly(2.0);
+    EXPECT_EQ(hover.monitor.effectiveness(1), 1.0);
+    EXPECT_FALSE(hover.monitor.lost_rotor());
+    hover.phase = Phase::kInFlight;
+    EXPECT_TRUE(said_within(hover, 5.0).empty());
+    ASSERT_EQ(hover.monitor.muted(), Muted::kNot);
+    hover.effectiveness[3] = 0.0;
+    const auto said = said_within(hover, 1.0);
+    ASSERT_EQ(said.size(), 1U);
+    EXPECT_EQ(said.front().rotor, 3U);
+    EXPECT_EQ(said.front().kind, LossKind::kPropellerLost);
+  }
+}
+
 // A gyroscope that repeats its last value while the body turns on: nobody has lost anything.
 TEST(EffectivenessMonitor, AnInertialUnitThatRepeatsItselfIsNoMeasurement) {
   for (const bool is_gyro : {true, false}) {
