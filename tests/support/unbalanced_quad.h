@@ -71,6 +71,7 @@ struct UnbalancedQuad {
 
   std::uint32_t blamed = 0;
   std::uint32_t cleared = 0;
+  int updates = 0;
   std::uint32_t candidates = 0;
   bool is_ambiguous = false;
   double found_s = -1.0;
@@ -132,6 +133,7 @@ struct UnbalancedQuad {
         if (found_s < 0.0) found_s = time_s;
       }
       if (rotor(i).transition == Transition::kClear) cleared |= 1U << i;
+      if (rotor(i).transition == Transition::kUpdate) ++updates;
     }
     if (monitor.ambiguity() == Transition::kRaise) {
       is_ambiguous = true;

@@ -66,6 +66,12 @@ bool tells_enough(const RotorUnbalance& rotor, const UnbalanceParams& params) {
          rotor.amplitude_m_s2 > 4.0 * rotor.sigma_m_s2;
 }
 
+// What was found stays found while nobody looks, and there is nothing new to say of it.
+Transition hold(FaultLifeCycle& life, TimePoint now) noexcept {
+  if (life.active()) static_cast<void>(life.step(1.0, now));
+  return Transition::kNone;
+}
+
 template <std::size_t... kIndex>
 std::array<FaultLifeCycle, sizeof...(kIndex)> life_cycles(const FaultLifeCycleParams& params,
                                                           std::index_sequence<kIndex...>) {
@@ -479,11 +485,10 @@ void RotorUnbalanceMonitor<N>::mute(UnbalanceNotJudged reason, TimePoint now) no
     rotor_[i].test_ratio = 0.0;
     rotor_[i].log_odds = 0.0;
     grown_[i].step(false, now);
-    // What was found stays found while nobody looks.
-    rotor_[i].transition = life_[i].active() ? life_[i].step(1.0, now) : Transition::kNone;
+    rotor_[i].transition = hold(life_[i], now);
   }
   ambiguous_.step(false, now);
-  ambiguity_ = ambiguity_life_.active() ? ambiguity_life_.step(1.0, now) : Transition::kNone;
+  ambiguity_ = hold(ambiguity_life_, now);
 }
 
 template <std::size_t N>
