@@ -23,6 +23,8 @@ std::string reason_of(NotJudged reason, double sigma) {
       return "inertial data, or rotor speeds and commands, missing";
     case NotJudged::kNotFlying:
       return "not in free flight";
+    case NotJudged::kFrozen:
+      return "the inertial unit repeats its values";
     case NotJudged::kConverging:
       return "converging: this flight has only begun";
     case NotJudged::kNotExcited:
@@ -30,6 +32,8 @@ std::string reason_of(NotJudged reason, double sigma) {
     case NotJudged::kNotObservable:
       return fmt::format("not told apart from disturbances and other rotors: loss known to {:.2f} only",
                          sigma);
+    case NotJudged::kImplausible:
+      return "what is felt is no loss of thrust: something else acts on the vehicle";
     case NotJudged::kJudged:
       break;
   }
@@ -209,6 +213,8 @@ rt::DetectorReport ActuatorService::report() const {
                                                evidence_of_axis(axis, monitor_.axis_states()[i], i)));
   }
   node_.counters()["samples_refused"] = monitor_.refused();
+  node_.counters()["outliers"] = monitor_.outliers();
+  node_.counters()["samples_repeated"] = monitor_.repeated();
   node_.counters()["times_restarted"] = monitor_.restarts();
   node_.counters()["attitudes_refused"] = monitor_.refused_attitudes();
   node_.counters()["speeds_refused"] = monitor_.rotor_input().refused_speeds();
