@@ -12,6 +12,9 @@ namespace {
 
 using Transition = FaultLifeCycle::Transition;
 
+// One fault per component: rotors, axes, and what is not named.
+constexpr std::size_t kAxisSlot = kMaxRotors;
+constexpr std::size_t kPropulsionSlot = kAxisSlot + kAxes;
 constexpr double kRadSPerRpm = std::numbers::pi / 30.0;
 constexpr std::array<const char*, kAxes> kAxisNames{"roll axis", "pitch axis", "yaw axis", "height axis"};
 
@@ -142,7 +145,7 @@ void ActuatorService::report_rotor(std::size_t rotor, const LossVerdict& verdict
                                 100.0 * verdict.test_gamma, rotor + 1);
   }
   fault.evidence = evidence_of_rotor(verdict, monitor_.nis());
-  reporter_.report(rotor, verdict.transition, monitor_.time(), fault);
+  reporter_.report(verdict.is_isolated ? rotor : kPropulsionSlot, verdict.transition, monitor_.time(), fault);
 }
 
 void ActuatorService::report_axis(std::size_t axis, const LossVerdict& verdict) {
@@ -159,7 +162,7 @@ void ActuatorService::report_axis(std::size_t axis, const LossVerdict& verdict) 
   fault.summary = fmt::format("{}: {:.0f} ± {:.0f} % of what is commanded does not come", kAxisNames[axis],
                               100.0 * verdict.gamma, 100.0 * verdict.sigma);
   fault.evidence = evidence_of_axis(verdict, monitor_.axis_states()[axis], axis);
-  reporter_.report(kMaxRotors + axis, verdict.transition, monitor_.time(), fault);
+  reporter_.report(kAxisSlot + axis, verdict.transition, monitor_.time(), fault);
 }
 
 void ActuatorService::publish_state() {

@@ -18,6 +18,7 @@ constexpr double kMostAccel_m_s2 = 2000.0;
 constexpr double kRawAccelFactor = 4.0;  // noise before the low-pass over that after it
 constexpr double kForceReach = 2.0;      // of weight and thrust: a thrust may come and go within one sample
 constexpr Duration kSilent{500'000};
+constexpr Duration kRepaired{3'000'000};  // on the ground
 constexpr Duration kConsequence{2'000'000};
 constexpr double kSuspected = 0.5;  // probability of a fault above which nothing is learned
 constexpr double kLeastLearning_s = 0.5;
@@ -83,6 +84,20 @@ ActuatorMonitor::ActuatorMonitor(const ActuatorMonitorParams& params) noexcept
   }
   for (auto& policy : rotor_policies_) policy.emplace(params_.rotor);
   for (auto& policy : axis_policies_) policy.emplace(params_.axis);
+}
+
+void ActuatorMonitor::watch_ground(Phase phase) noexcept {
+  if (phase != Phase::kOnGround) on_ground_since_.reset();
+  if (phase == Phase::kOnGround && !on_ground_since_) on_ground_since_ = now_;
+  if (on_ground_since_ && now_ - *on_ground_since_ >= kRepaired) forget_flights();
+}
+
+void ActuatorMonitor::forget_flights() noexcept {
+  thrust_ratio_ = 1.0;
+  last_raised_.reset();
+  for (auto& policy : rotor_policies_) policy->rearm();
+  for (auto& policy : axis_policies_) policy->rearm();
+  for (LossVerdict& verdict : rotor_verdicts_) verdict.baseline = 0.0;
 }
 
 void ActuatorMonitor::start_flight() noexcept {
@@ -211,10 +226,12 @@ UpdateStatus ActuatorMonitor::on_imu(const MonitorSample& sample, Phase phase) n
   now_ = sample.time;
   has_time_ = true;
   if (is_restart && last_raised_ > now_) last_raised_.reset();
+  if (is_restart) on_ground_since_.reset();
   if (is_restart || dt_s > kLongestStep_s) pause(NotJudged::kNoInput);
   const double step_s = std::min(dt_s, kLongestStep_s);
   thrust_.advance(now_, step_s);
   check_sensors(sample);
+  watch_ground(phase);
   if (const NotJudged reason = obstacle(phase); reason != NotJudged::kJudged) {
     pause(reason);
     return UpdateStatus::kFused;

@@ -120,7 +120,9 @@ struct MonitorSample {
 /// What γ beyond [−1, 2] would explain is no loss: it is not raised, and the bound is published with the reason.
 /// A sample that SampleCheck does not take is no measurement: the observers go on by their models alone. What repeats for
 /// longer than 0.1 s mutes, and the flight's estimates start anew after it.
-/// In a phase other than flight nothing is estimated, and each flight starts anew.
+/// In a phase other than flight nothing is estimated, and each flight starts anew. Once the vehicle has stood on the ground
+/// for 3 s it may have been repaired: baselines, thrust per command and latched rotors are forgotten, and what is found in
+/// the next flight is raised again. Whether that is news to the operator is for who publishes it to say.
 class ActuatorMonitor {
  public:
   static constexpr int kRotorStates = 8;
@@ -167,6 +169,8 @@ class ActuatorMonitor {
  private:
   struct Body;
 
+  void watch_ground(Phase phase) noexcept;
+  void forget_flights() noexcept;
   void start_flight() noexcept;
   void pause(NotJudged reason) noexcept;
   [[nodiscard]] NotJudged obstacle(Phase phase) const noexcept;
@@ -218,6 +222,7 @@ class ActuatorMonitor {
   std::int64_t refused_ = 0;
   std::int64_t refused_attitudes_ = 0;
   std::optional<TimePoint> last_raised_;
+  std::optional<TimePoint> on_ground_since_;
 
   std::array<LossVerdict, kMaxRotors> rotor_verdicts_{};
   std::array<LossVerdict, kAxes> axis_verdicts_{};

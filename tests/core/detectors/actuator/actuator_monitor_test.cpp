@@ -195,6 +195,62 @@ TEST(ActuatorMonitor, AFaultOutlivesALanding) {
   EXPECT_EQ(flight.raised, 1);  // latched: raised before, and not again
 }
 
+TEST(ActuatorMonitor, ARepairedRotorIsForgottenOnTheGround) {
+  for (const std::size_t next : {0U, 2U}) {
+    Flight flight{4};
+    flight.fly(30);
+    flight.body.loss_ratio[0] = 0.5;
+    flight.fly(2);
+    ASSERT_EQ(flight.named, 0U);
+    flight.fly(4, Phase::kOnGround);
+    flight.body.loss_ratio[0] = 0.0;
+    for (const LossVerdict& rotor : flight.monitor.rotors()) EXPECT_EQ(rotor.baseline, 0.0);
+    flight.fly(30);
+    EXPECT_EQ(flight.raised, 1);
+    flight.named.reset();
+    flight.body.loss_ratio[next] = next == 0 ? 0.6 : 0.4;
+    flight.fly(2);
+    EXPECT_EQ(flight.raised, 2) << next;
+    EXPECT_EQ(flight.named, next);
+    EXPECT_EQ(flight.axis_raised, 0);
+  }
+}
+
+TEST(ActuatorMonitor, ARotorThatIsNotRepairedBlamesNoOther) {
+  Flight flight{4};
+  flight.fly(30);
+  flight.body.loss_ratio[3] = 0.5;
+  flight.fly(2);
+  flight.fly(60, Phase::kOnGround);
+  flight.named.reset();
+  flight.fly(60);
+  EXPECT_EQ(flight.named.value_or(3), 3U);
+}
+
+TEST(ActuatorMonitor, ATouchOfTheGroundForgetsNothing) {
+  Flight flight{4};
+  flight.body.loss_ratio[0] = 0.1;
+  flight.fly(30);
+  const double baseline = flight.monitor.rotors()[0].baseline;
+  ASSERT_GT(baseline, 0.05);
+  for (int i = 0; i < 5; ++i) {
+    flight.fly(2.5, Phase::kOnGround);
+    flight.fly(0.5, Phase::kTakeOff);
+  }
+  EXPECT_EQ(flight.monitor.rotors()[0].baseline, baseline);
+}
+
+TEST(ActuatorMonitor, AFreshBatteryIsNotJudgedByTheOldOne) {
+  Flight flight{4};
+  for (std::size_t i = 0; i < 4; ++i) flight.body.loss_ratio[i] = 0.2;  // all alike: less thrust per command
+  flight.fly(30);
+  ASSERT_EQ(flight.raised, 0);
+  EXPECT_NEAR(flight.monitor.axis_states()[kHeight].commanded, 0.8 * 9.81, 0.4);
+  flight.fly(4, Phase::kOnGround);
+  flight.fly(HoveringMultirotor::kStep_s);
+  EXPECT_NEAR(flight.monitor.axis_states()[kHeight].commanded, 9.81, 0.4);
+}
+
 TEST(ActuatorMonitor, RefusesWhatIsNoSampleAndNoticesSilence) {
   Flight flight{4};
   EXPECT_EQ(flight.monitor.state(), DetectorState::kInitialising);
