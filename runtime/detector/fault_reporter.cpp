@@ -77,6 +77,7 @@ FaultReporter::FaultReporter(Node& node, std::string detector, std::function<Det
 
 void FaultReporter::report(std::size_t slot, Transition transition, TimePoint now, const Fault& fault) {
   if (transition == Transition::kNone) return;
+  if (transition == Transition::kRaise && active_.count(slot) > 0) transition = Transition::kUpdate;
   if (transition == Transition::kRaise) active_[slot] = raised(next_number_++, detector_, now, fault);
   const auto found = active_.find(slot);
   if (found == active_.end()) return;

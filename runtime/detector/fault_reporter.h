@@ -59,7 +59,8 @@ class FaultReporter {
   FaultReporter& operator=(const FaultReporter&) = delete;
 
   /// Faults of different slots live beside each other. Component, kind and onset stay as they were raised;
-  /// a transition of a fault that was never raised says nothing.
+  /// a transition of a fault that was never raised says nothing. Raised again before it was cleared, as in the next flight
+  /// if it is latched, a fault is the same one and is updated.
   void report(std::size_t slot, FaultLifeCycle::Transition transition, TimePoint now, const Fault& fault);
 
  private:

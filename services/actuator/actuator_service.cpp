@@ -12,6 +12,9 @@ namespace {
 
 using Transition = FaultLifeCycle::Transition;
 
+// One fault per component: rotors, axes, and what is not named.
+constexpr std::size_t kAxisSlot = kMaxRotors;
+constexpr std::size_t kPropulsionSlot = kAxisSlot + kAxes;
 constexpr double kRadSPerRpm = std::numbers::pi / 30.0;
 constexpr std::array<const char*, kAxes> kAxisNames{"roll axis", "pitch axis", "yaw axis", "height axis"};
 
@@ -23,6 +26,8 @@ std::string reason_of(NotJudged reason, double sigma) {
       return "inertial data, or rotor speeds and commands, missing";
     case NotJudged::kNotFlying:
       return "not in free flight";
+    case NotJudged::kFrozen:
+      return "the inertial unit repeats its values";
     case NotJudged::kConverging:
       return "converging: this flight has only begun";
     case NotJudged::kNotExcited:
@@ -30,6 +35,8 @@ std::string reason_of(NotJudged reason, double sigma) {
     case NotJudged::kNotObservable:
       return fmt::format("not told apart from disturbances and other rotors: loss known to {:.2f} only",
                          sigma);
+    case NotJudged::kImplausible:
+      return "what is felt is no loss of thrust: something else acts on the vehicle";
     case NotJudged::kJudged:
       break;
   }
@@ -138,7 +145,7 @@ void ActuatorService::report_rotor(std::size_t rotor, const LossVerdict& verdict
                                 100.0 * verdict.test_gamma, rotor + 1);
   }
   fault.evidence = evidence_of_rotor(verdict, monitor_.nis());
-  reporter_.report(rotor, verdict.transition, monitor_.time(), fault);
+  reporter_.report(verdict.is_isolated ? rotor : kPropulsionSlot, verdict.transition, monitor_.time(), fault);
 }
 
 void ActuatorService::report_axis(std::size_t axis, const LossVerdict& verdict) {
@@ -155,7 +162,7 @@ void ActuatorService::report_axis(std::size_t axis, const LossVerdict& verdict) 
   fault.summary = fmt::format("{}: {:.0f} ± {:.0f} % of what is commanded does not come", kAxisNames[axis],
                               100.0 * verdict.gamma, 100.0 * verdict.sigma);
   fault.evidence = evidence_of_axis(verdict, monitor_.axis_states()[axis], axis);
-  reporter_.report(kMaxRotors + axis, verdict.transition, monitor_.time(), fault);
+  reporter_.report(kAxisSlot + axis, verdict.transition, monitor_.time(), fault);
 }
 
 void ActuatorService::publish_state() {
@@ -209,6 +216,8 @@ rt::DetectorReport ActuatorService::report() const {
                                                evidence_of_axis(axis, monitor_.axis_states()[i], i)));
   }
   node_.counters()["samples_refused"] = monitor_.refused();
+  node_.counters()["outliers"] = monitor_.outliers();
+  node_.counters()["samples_repeated"] = monitor_.repeated();
   node_.counters()["times_restarted"] = monitor_.restarts();
   node_.counters()["attitudes_refused"] = monitor_.refused_attitudes();
   node_.counters()["speeds_refused"] = monitor_.rotor_input().refused_speeds();

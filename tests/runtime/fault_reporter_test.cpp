@@ -92,6 +92,18 @@ TEST_F(FaultReporterTest, AFaultKeepsItsNumberFromRaiseToClear) {
   EXPECT_EQ(events_.back().number, 2) << "found again, a fault is a new one";
 }
 
+TEST_F(FaultReporterTest, RaisedAgainBeforeItWasClearedAFaultIsUpdated) {
+  report(0, Transition::kRaise, 5.0);
+  report(0, Transition::kRaise, 8.0);
+  ASSERT_EQ(events_.size(), 2U);
+  EXPECT_EQ(events_[1].number, 1);
+  EXPECT_EQ(events_[1].phase, 2);
+  EXPECT_EQ(events_[1].magnitude, 8.0);
+  report(1, Transition::kRaise, 1.0);
+  EXPECT_EQ(events_.back().number, 2);
+  EXPECT_EQ(statuses_.back().active_count, 2);
+}
+
 TEST_F(FaultReporterTest, FaultsOfDifferentSlotsLiveBesideEachOther) {
   report(0, Transition::kRaise, 1.0);
   report(3, Transition::kRaise, 2.0);

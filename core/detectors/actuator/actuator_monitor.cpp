@@ -12,7 +12,13 @@ namespace {
 constexpr double kGravity_m_s2 = 9.81;
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 constexpr double kLongestStep_s = 0.1;  // a longer gap starts the flight's estimates anew
+constexpr Duration kLongestRepeat{100'000};
+constexpr double kMostRate_rad_s = 200.0;  // no gyro and no accelerometer gives more
+constexpr double kMostAccel_m_s2 = 2000.0;
+constexpr double kRawAccelFactor = 4.0;  // noise before the low-pass over that after it
+constexpr double kForceReach = 2.0;      // of weight and thrust: a thrust may come and go within one sample
 constexpr Duration kSilent{500'000};
+constexpr Duration kRepaired{3'000'000};  // on the ground
 constexpr Duration kConsequence{2'000'000};
 constexpr double kSuspected = 0.5;  // probability of a fault above which nothing is learned
 constexpr double kLeastLearning_s = 0.5;
@@ -38,6 +44,20 @@ constexpr double kLeast_variance = 1e-12;      // keeps a covariance positive wh
 
 double square(double x) { return x * x; }
 
+bool is_loss(double gamma) { return gamma >= kLeastLoss && gamma <= kMostLoss; }
+
+UpdateStatus plausibility(const MonitorSample& sample) {
+  bool is_in_range = true;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double accel_m_s2 = sample.accel_m_s2[i];
+    const double rate_rad_s = sample.gyro_rad_s[i];
+    if (!std::isfinite(accel_m_s2) || !std::isfinite(rate_rad_s)) return UpdateStatus::kNotFinite;
+    is_in_range =
+        is_in_range && std::abs(accel_m_s2) <= kMostAccel_m_s2 && std::abs(rate_rad_s) <= kMostRate_rad_s;
+  }
+  return is_in_range ? UpdateStatus::kFused : UpdateStatus::kOutOfRange;
+}
+
 }  // namespace
 
 /// The inertial sample as the observers see it.
@@ -49,7 +69,11 @@ struct ActuatorMonitor::Body {
 };
 
 ActuatorMonitor::ActuatorMonitor(const ActuatorMonitorParams& params) noexcept
-    : params_{params}, mixing_{mixing_matrix(params.vehicle)}, thrust_{params.vehicle, params.source} {
+    : params_{params},
+      mixing_{mixing_matrix(params.vehicle)},
+      thrust_{params.vehicle, params.source},
+      gyro_{params.gyro_sigma_rad_s},
+      accel_{kRawAccelFactor * params.accel_sigma_m_s2} {
   const double hover_m_s2 = kGravity_m_s2 / static_cast<double>(params_.vehicle.rotor_count);
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const double ratio = axis == kYaw      ? params_.yaw_disturbance_ratio
@@ -60,6 +84,20 @@ ActuatorMonitor::ActuatorMonitor(const ActuatorMonitorParams& params) noexcept
   }
   for (auto& policy : rotor_policies_) policy.emplace(params_.rotor);
   for (auto& policy : axis_policies_) policy.emplace(params_.axis);
+}
+
+void ActuatorMonitor::watch_ground(Phase phase) noexcept {
+  if (phase != Phase::kOnGround) on_ground_since_.reset();
+  if (phase == Phase::kOnGround && !on_ground_since_) on_ground_since_ = now_;
+  if (on_ground_since_ && now_ - *on_ground_since_ >= kRepaired) forget_flights();
+}
+
+void ActuatorMonitor::forget_flights() noexcept {
+  thrust_ratio_ = 1.0;
+  last_raised_.reset();
+  for (auto& policy : rotor_policies_) policy->rearm();
+  for (auto& policy : axis_policies_) policy->rearm();
+  for (LossVerdict& verdict : rotor_verdicts_) verdict.baseline = 0.0;
 }
 
 void ActuatorMonitor::start_flight() noexcept {
@@ -98,6 +136,9 @@ void ActuatorMonitor::pause(NotJudged reason) noexcept {
   reason_ = reason;
   rotor_observer_.reset();
   axis_states_.fill({});
+  gyro_.restart();
+  accel_.restart();
+  has_accel_up_ = false;
   const auto stop = [&](LossVerdict& verdict, LossPolicy& policy) {
     policy.pause(now_);
     const double baseline = verdict.baseline;
@@ -121,6 +162,7 @@ DetectorState ActuatorMonitor::state() const noexcept {
   switch (reason_) {
     case NotJudged::kNoInput:
     case NotJudged::kNotFlying:
+    case NotJudged::kFrozen:
       return DetectorState::kMuted;
     case NotJudged::kConverging:
       return DetectorState::kConverging;
@@ -143,11 +185,36 @@ void ActuatorMonitor::learn_thrust_ratio(double dt_s) noexcept {
   thrust_ratio_ = std::clamp(thrust_ratio_, kLeastThrustRatio, kMostThrustRatio);
 }
 
+NotJudged ActuatorMonitor::obstacle(Phase phase) const noexcept {
+  if (!thrust_.is_known()) return NotJudged::kNoInput;
+  if (phase != Phase::kInFlight) return NotJudged::kNotFlying;
+  const Duration repeats = std::max(gyro_.repeats_for(now_), accel_.repeats_for(now_));
+  return repeats > kLongestRepeat ? NotJudged::kFrozen : NotJudged::kJudged;
+}
+
+void ActuatorMonitor::check_sensors(const MonitorSample& sample) noexcept {
+  AxisVector most = AxisVector::Zero();
+  for (std::size_t j = 0; j < params_.vehicle.rotor_count; ++j) {
+    most += mixing_.col(static_cast<int>(j)).cwiseAbs() * thrust_.specific_thrust_m_s2(j);
+  }
+  // All rotors at once about any axis; about yaw, where drag does little, they do as much by spinning up.
+  const double turn_rad_s = gyro_.since_taken_s(now_) * most.head<3>().maxCoeff();
+  has_gyro_ = gyro_.judge(now_, sample.gyro_rad_s, {turn_rad_s, turn_rad_s, turn_rad_s}) ==
+              SampleCheck::Verdict::kTaken;
+  const double force_m_s2 = kForceReach * std::max(kGravity_m_s2, most(kHeight));
+  const double since_s = accel_.since_taken_s(now_);
+  has_accel_ = accel_.judge(now_, sample.accel_m_s2, {force_m_s2, force_m_s2, force_m_s2}) ==
+               SampleCheck::Verdict::kTaken;
+  if (!has_accel_) return;
+  const double share = has_accel_up_ ? 1.0 - std::exp(-since_s / params_.accel_lowpass_s) : 1.0;
+  accel_up_m_s2_ += share * (-sample.accel_m_s2[2] - accel_up_m_s2_);
+  has_accel_up_ = true;
+}
+
 UpdateStatus ActuatorMonitor::on_imu(const MonitorSample& sample, Phase phase) noexcept {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (std::isfinite(sample.accel_m_s2[i]) && std::isfinite(sample.gyro_rad_s[i])) continue;
+  if (const UpdateStatus status = plausibility(sample); status != UpdateStatus::kFused) {
     ++refused_;
-    return UpdateStatus::kNotFinite;
+    return status;
   }
   const StampGate::Stamp stamp = stamps_.judge(sample.time);
   if (stamp == StampGate::Stamp::kSame || stamp == StampGate::Stamp::kOlder) {
@@ -159,19 +226,21 @@ UpdateStatus ActuatorMonitor::on_imu(const MonitorSample& sample, Phase phase) n
   now_ = sample.time;
   has_time_ = true;
   if (is_restart && last_raised_ > now_) last_raised_.reset();
+  if (is_restart) on_ground_since_.reset();
   if (is_restart || dt_s > kLongestStep_s) pause(NotJudged::kNoInput);
   const double step_s = std::min(dt_s, kLongestStep_s);
   thrust_.advance(now_, step_s);
-  if (!thrust_.is_known() || phase != Phase::kInFlight) {
-    pause(thrust_.is_known() ? NotJudged::kNotFlying : NotJudged::kNoInput);
+  check_sensors(sample);
+  watch_ground(phase);
+  if (const NotJudged reason = obstacle(phase); reason != NotJudged::kJudged) {
+    pause(reason);
     return UpdateStatus::kFused;
   }
   if (!rotor_observer_) {
     start_flight();
-    has_accel_ = false;
     reason_ = NotJudged::kConverging;
   }
-  if (!estimate(sample, step_s)) {
+  if (!estimate(sample.gyro_rad_s, step_s)) {
     ++refused_;
     pause(NotJudged::kNoInput);
     return UpdateStatus::kNotFinite;
@@ -196,12 +265,10 @@ Eigen::Matrix<double, 3, 1> ActuatorMonitor::gyroscopic(
           ((inertia[0] - inertia[1]) * p * q - thrust_.spin_up_torque_N_m()) / inertia[2]};
 }
 
-bool ActuatorMonitor::estimate(const MonitorSample& sample, double dt_s) noexcept {
-  Body body{sample.gyro_rad_s, 0.0, 1.0 - std::exp(-dt_s / params_.accel_lowpass_s), {}};
-  const double up_m_s2 = -sample.accel_m_s2[2];
-  accel_up_m_s2_ = has_accel_ ? accel_up_m_s2_ + body.lowpass_share * (up_m_s2 - accel_up_m_s2_) : up_m_s2;
-  has_accel_ = true;
-  body.accel_up_m_s2 = accel_up_m_s2_;
+bool ActuatorMonitor::estimate(const std::array<double, 3>& gyro_rad_s, double dt_s) noexcept {
+  Body body{gyro_rad_s, accel_up_m_s2_, 1.0 - std::exp(-dt_s / params_.accel_lowpass_s), {}};
+  const RotorObserver::StateVector& x = rotor_observer_->state();
+  if (!has_gyro_) body.rate_rad_s = {x(0), x(1), x(2)};
   body.known_rad_s2 = gyroscopic(body.rate_rad_s);
   find_thrusts(body);
   const RotorThrust::Speeds missed = thrust_.take_missed_m_s();
@@ -262,7 +329,7 @@ UpdateStatus ActuatorMonitor::estimate_rotors(const Body& body, double dt_s) noe
                               (is_height ? 0.0 : square(missed_(axis))) + kLeast_variance;
     measurement.c(axis, axis) = 1.0;
     const double commanded = (mixing_.row(axis) * model.u).value();
-    measurement.noise(axis, axis) = is_height ? square(params_.accel_sigma_m_s2) : rate_variance(commanded);
+    measurement.noise(axis, axis) = is_height ? accel_variance() : rate_variance(commanded);
     measurement.y(axis) = is_height ? body.accel_up_m_s2 : body.rate_rad_s[static_cast<std::size_t>(axis)];
   }
   return rotor_observer_->step(model, measurement, innovation_);
@@ -270,7 +337,12 @@ UpdateStatus ActuatorMonitor::estimate_rotors(const Body& body, double dt_s) noe
 
 // The gyro sees a thrust by timing_sigma_s earlier or later than it is thought to act.
 double ActuatorMonitor::rate_variance(double commanded_rad_s2) const noexcept {
+  if (!has_gyro_) return kNotMeasured_variance;
   return square(params_.gyro_sigma_rad_s) + square(params_.timing_sigma_s * commanded_rad_s2);
+}
+
+double ActuatorMonitor::accel_variance() const noexcept {
+  return has_accel_ ? square(params_.accel_sigma_m_s2) : kNotMeasured_variance;
 }
 
 ActuatorMonitor::AxisObserver::Transition ActuatorMonitor::axis_transition(std::size_t axis, const Body& body,
@@ -324,7 +396,7 @@ ActuatorMonitor::AxisObserver::Measurement ActuatorMonitor::axis_measurement(std
     measurement.y(0) =
         is_height ? climb_m_s_ : expected + std::remainder(angle_rad_[axis] - expected, kTurn_rad);
   }
-  measurement.noise(1, 1) = is_height ? square(params_.accel_sigma_m_s2) : rate_variance(input);
+  measurement.noise(1, 1) = is_height ? accel_variance() : rate_variance(input);
   measurement.y(1) = is_height ? body.accel_up_m_s2 : body.rate_rad_s[axis];
   return measurement;
 }
@@ -408,9 +480,13 @@ void ActuatorMonitor::judge_rotor(std::size_t rotor) noexcept {
   verdict.reason = NotJudged::kJudged;
   if (reason_ == NotJudged::kConverging) {
     verdict.reason = NotJudged::kConverging;
+  } else if (!is_loss(verdict.test_gamma)) {
+    verdict.reason = NotJudged::kImplausible;
   } else if (!policy.active() && !(verdict.test_sigma <= params_.rotor_judged_sigma)) {
     verdict.reason = NotJudged::kNotObservable;
   }
+  verdict.gamma = std::clamp(verdict.gamma, kLeastLoss, kMostLoss);
+  verdict.test_gamma = std::clamp(verdict.test_gamma, kLeastLoss, kMostLoss);
   // A second failure must be beyond doubt: the first one's effects are not all in the model.
   const bool may_raise = verdict.reason == NotJudged::kJudged && verdict.lead >= 0.0 && !is_consequence() &&
                          (verdict.is_isolated || !any_rotor_failed());
@@ -450,8 +526,10 @@ void ActuatorMonitor::judge_axes() noexcept {
     verdict.sigma = verdict.test_sigma = std::sqrt(axis_observers_[axis]->fault_covariance()(0, 0));
     const bool is_seen = verdict.sigma <= params_.axis_judged_sigma;
     verdict.reason = reason_ == NotJudged::kConverging ? NotJudged::kConverging
-                     : is_seen                         ? NotJudged::kJudged
-                                                       : NotJudged::kNotExcited;
+                     : !is_seen                        ? NotJudged::kNotExcited
+                     : is_loss(verdict.gamma)          ? NotJudged::kJudged
+                                                       : NotJudged::kImplausible;
+    verdict.gamma = verdict.test_gamma = std::clamp(verdict.gamma, kLeastLoss, kMostLoss);
     // A rotor that has failed takes its part of every axis with it.
     const bool may_raise = verdict.reason == NotJudged::kJudged && !is_consequence() && !any_rotor_failed();
     verdict.transition = axis_policies_[axis]->step(verdict.test_gamma, verdict.test_sigma, may_raise, now_);

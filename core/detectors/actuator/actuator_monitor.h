@@ -10,6 +10,7 @@
 #include "core/detectors/actuator/loss_policy.h"
 #include "core/detectors/actuator/mixing.h"
 #include "core/detectors/actuator/rotor_thrust.h"
+#include "core/detectors/actuator/sample_check.h"
 #include "core/detectors/detector_state.h"
 #include "core/detectors/flight_phase.h"
 #include "core/estimators/actuator/multi_stage_observer.h"
@@ -53,14 +54,20 @@ enum class NotJudged : std::uint8_t {
   kJudged,
   kNoInput,        ///< neither speed nor command of the rotors
   kNotFlying,      ///< the phase of flight forbids it
+  kFrozen,         ///< the inertial unit repeats its values
   kConverging,     ///< not yet long enough in flight
   kNotExcited,     ///< nothing was asked of this axis that would tell
   kNotObservable,  ///< the rotors' forces do not tell this one from others
+  kImplausible,    ///< γ is what no loss can be: the model does not hold
 };
+
+/// γ beyond these is no loss of effectiveness.
+inline constexpr double kLeastLoss = -1.0;
+inline constexpr double kMostLoss = 2.0;
 
 /// γ ± σ of one rotor or axis and what became of it. Equation numbers: ActuatorMonitor.
 struct LossVerdict {
-  double gamma = std::numeric_limits<double>::quiet_NaN();
+  double gamma = std::numeric_limits<double>::quiet_NaN();  ///< like test_gamma within kLeastLoss, kMostLoss
   double sigma = std::numeric_limits<double>::quiet_NaN();
   double baseline = 0.0;  ///< of γ, learned while healthy
   double test_gamma =
@@ -110,7 +117,12 @@ struct MonitorSample {
 /// Neither baseline (time constant 20 s, bounded) nor q learns while a fault is more probable than not.
 /// Collective thrust per command differs from the vehicle file (battery, air): the ratio is learned in flight, over 3 s
 /// first, then over a minute, and not while anything is suspected. A loss that all rotors share is therefore not seen.
-/// In a phase other than flight nothing is estimated, and each flight starts anew.
+/// What γ beyond [−1, 2] would explain is no loss: it is not raised, and the bound is published with the reason.
+/// A sample that SampleCheck does not take is no measurement: the observers go on by their models alone. What repeats for
+/// longer than 0.1 s mutes, and the flight's estimates start anew after it.
+/// In a phase other than flight nothing is estimated, and each flight starts anew. Once the vehicle has stood on the ground
+/// for 3 s it may have been repaired: baselines, thrust per command and latched rotors are forgotten, and what is found in
+/// the next flight is raised again. Whether that is news to the operator is for who publishes it to say.
 class ActuatorMonitor {
  public:
   static constexpr int kRotorStates = 8;
@@ -129,7 +141,8 @@ class ActuatorMonitor {
   void on_attitude(double roll_rad, double pitch_rad, double yaw_rad) noexcept;
   /// Positive up; NaN = not known: not fused.
   void on_climb(double climb_m_s) noexcept;
-  /// Estimates and judges. kTimeBackward (by StampGate), kNotFinite: nothing happened.
+  /// Estimates and judges. kTimeBackward (by StampGate), kNotFinite, kOutOfRange (beyond 200 rad/s or 2000 m/s²): nothing
+  /// happened.
   UpdateStatus on_imu(const MonitorSample& sample, Phase phase) noexcept;
   /// Silence of the inertial unit, judged on the gateway's clock.
   void on_clock(TimePoint now) noexcept;
@@ -143,9 +156,12 @@ class ActuatorMonitor {
   [[nodiscard]] const std::array<LossVerdict, kAxes>& axes() const noexcept { return axis_verdicts_; }
   [[nodiscard]] const std::array<AxisState, kAxes>& axis_states() const noexcept { return axis_states_; }
   [[nodiscard]] double nis() const noexcept { return innovation_.nis; }
-  /// Inertial samples: not finite, or not newer than the one before.
+  /// Inertial samples: not finite, out of range, or not newer than the one before.
   [[nodiscard]] std::int64_t refused() const noexcept { return refused_; }
   [[nodiscard]] std::int64_t refused_attitudes() const noexcept { return refused_attitudes_; }
+  /// Samples of gyro or accelerometer that were no measurement, by SampleCheck.
+  [[nodiscard]] std::int64_t outliers() const noexcept { return gyro_.outliers() + accel_.outliers(); }
+  [[nodiscard]] std::int64_t repeated() const noexcept { return gyro_.repeated() + accel_.repeated(); }
   /// How often the newest inertial stamp turned out to have been wrong.
   [[nodiscard]] std::int64_t restarts() const noexcept { return stamps_.restarts(); }
   [[nodiscard]] const RotorThrust& rotor_input() const noexcept { return thrust_; }
@@ -153,10 +169,14 @@ class ActuatorMonitor {
  private:
   struct Body;
 
+  void watch_ground(Phase phase) noexcept;
+  void forget_flights() noexcept;
   void start_flight() noexcept;
   void pause(NotJudged reason) noexcept;
+  [[nodiscard]] NotJudged obstacle(Phase phase) const noexcept;
+  void check_sensors(const MonitorSample& sample) noexcept;
   void learn_thrust_ratio(double dt_s) noexcept;
-  [[nodiscard]] bool estimate(const MonitorSample& sample, double dt_s) noexcept;
+  [[nodiscard]] bool estimate(const std::array<double, 3>& gyro_rad_s, double dt_s) noexcept;
   void find_thrusts(const Body& body) noexcept;
   [[nodiscard]] UpdateStatus estimate_rotors(const Body& body, double dt_s) noexcept;
   [[nodiscard]] UpdateStatus estimate_axis(std::size_t axis, const Body& body, double dt_s) noexcept;
@@ -172,6 +192,7 @@ class ActuatorMonitor {
   [[nodiscard]] bool any_rotor_failed() const noexcept;
   void compare(std::size_t rotor) noexcept;
   [[nodiscard]] double rate_variance(double commanded_rad_s2) const noexcept;
+  [[nodiscard]] double accel_variance() const noexcept;
   void judge_axes() noexcept;
   [[nodiscard]] Eigen::Matrix<double, 3, 1> gyroscopic(
       const std::array<double, 3>& rate_rad_s) const noexcept;
@@ -185,6 +206,8 @@ class ActuatorMonitor {
   RotorObserver::Innovation innovation_;
 
   StampGate stamps_;
+  SampleCheck gyro_;
+  SampleCheck accel_;
   TimePoint now_{};
   double flown_s_ = 0.0;
   double thrust_ratio_ = 1.0;
@@ -199,6 +222,7 @@ class ActuatorMonitor {
   std::int64_t refused_ = 0;
   std::int64_t refused_attitudes_ = 0;
   std::optional<TimePoint> last_raised_;
+  std::optional<TimePoint> on_ground_since_;
 
   std::array<LossVerdict, kMaxRotors> rotor_verdicts_{};
   std::array<LossVerdict, kAxes> axis_verdicts_{};
@@ -206,8 +230,10 @@ class ActuatorMonitor {
   std::array<std::optional<LossPolicy>, kMaxRotors> rotor_policies_;
   std::array<std::optional<LossPolicy>, kAxes> axis_policies_;
   bool has_time_ = false;
-  NotJudged reason_ = NotJudged::kNoInput;
+  bool has_gyro_ = false;  ///< of this sample: it is a measurement
   bool has_accel_ = false;
+  NotJudged reason_ = NotJudged::kNoInput;
+  bool has_accel_up_ = false;
   bool has_new_angle_ = false;
 };
 

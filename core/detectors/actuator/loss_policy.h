@@ -28,6 +28,12 @@ class LossPolicy {
   /// Time in which nothing was judged counts for nothing.
   void pause(TimePoint now) noexcept;
 
+  /// For the next flight, after one may have repaired it: a latched fault is ready to be raised again. One that can clear
+  /// stays active until it does.
+  void rearm() noexcept {
+    if (params_.life_cycle.latched) life_ = FaultLifeCycle{params_.life_cycle};
+  }
+
   [[nodiscard]] double probability() const noexcept { return probability_; }
   [[nodiscard]] bool active() const noexcept { return life_.active(); }
   [[nodiscard]] TimePoint onset() const noexcept { return onset_; }

@@ -17,17 +17,19 @@ namespace {
 
 using ::testing::HasSubstr;
 
-ActuatorConfig config_of(const Multirotor& vehicle) {
+ActuatorConfig config_of(const Multirotor& vehicle, double isolation_log_likelihood) {
   ActuatorConfig config;
   config.vehicle = "v1";
   config.monitor.vehicle = vehicle;
+  config.monitor.isolation_log_likelihood = isolation_log_likelihood;
   return config;
 }
 
 /// A driver on an in-process bus, and the service.
 class ActuatorServiceTest : public ::testing::Test {
  protected:
-  ActuatorServiceTest() {
+  explicit ActuatorServiceTest(double isolation_log_likelihood = 5.0)
+      : config_{config_of(body_.vehicle, isolation_log_likelihood)} {
     body_.vehicle.gear_height_m = 0.1;
     body_.vehicle.gear_radius_m = 0.1;
     observer_.subscribe<fault_event_t>(channel::kFaultEvent,
@@ -42,6 +44,7 @@ class ActuatorServiceTest : public ::testing::Test {
 
   void fly(double seconds, bool airborne = true) {
     const int steps = static_cast<int>(std::lround(seconds / test::HoveringMultirotor::kStep_s));
+    body_.excitation = airborne ? 1.0 : 0.0;  // the ground keeps it still
     for (int i = 0; i < steps; ++i) {
       body_.step();
       const TimePoint now = kStart + from_seconds(body_.time_s);
@@ -76,7 +79,8 @@ class ActuatorServiceTest : public ::testing::Test {
     flight_state_t state{};
     state.landed_state = airborne ? 2 : 1;
     state.armed = 1;
-    state.climb_m_s = airborne && body_.time_s < 5.0 ? 1.0 : 0.0;
+    if (!airborne) took_off_s_ = body_.time_s;
+    state.climb_m_s = airborne && body_.time_s < took_off_s_ + 5.0 ? 1.0 : 0.0;
     flight_states_.publish(state, now);
     tick_t tick{};
     ticks_.publish(tick, now);
@@ -97,6 +101,7 @@ class ActuatorServiceTest : public ::testing::Test {
   static constexpr TimePoint kStart = from_us(50'000'000);
 
   test::HoveringMultirotor body_{4, 11};
+  double took_off_s_ = 0;
   std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
   rt::ManualClock clock_{kStart};
   rt::Log log_{"test", rt::LogLevel::kError};
@@ -109,7 +114,7 @@ class ActuatorServiceTest : public ::testing::Test {
   rt::Publisher<tick_t> ticks_{driver_.advertise(channel::kTick)};
   rt::Node observer_{*bus_, clock_, log_, {"v1", "observer", 4}};
   rt::Node node_{*bus_, clock_, log_, {"v1", "airworthy-actuator", 5}};
-  ActuatorConfig config_ = config_of(body_.vehicle);
+  ActuatorConfig config_;
   ActuatorService service_{node_, config_};
   std::vector<fault_event_t> events_;
   detector_status_t status_;
@@ -143,6 +148,60 @@ TEST_F(ActuatorServiceTest, NamesTheRotorInTheSampleThatDecided) {
   EXPECT_TRUE(event.candidates.empty());
   ASSERT_EQ(status_.active.size(), 1U);
   EXPECT_EQ(status_.active[0].component, "rotor 3");
+}
+
+TEST_F(ActuatorServiceTest, AfterARepairTheFaultStaysLatchedAndTheNextOneUpdatesOrJoinsIt) {
+  fly(25);
+  body_.loss_ratio[2] = 0.6;
+  fly(1);
+  body_.loss_ratio[2] = 0.0;
+  fly(8, false);
+  ASSERT_EQ(status_.active.size(), 1U);
+  const std::int64_t first = status_.active[0].number;
+  fly(25);
+  ASSERT_EQ(status_.state, 2) << status_.muted_reason;
+  EXPECT_EQ(assessment("rotor 3").judged, 1);
+  EXPECT_EQ(status_.active.size(), 1U);
+  EXPECT_EQ(status_.active[0].detected_us, events_[0].detected_us);
+
+  events_.clear();
+  body_.loss_ratio[2] = 0.8;
+  fly(1);
+  ASSERT_GE(events_.size(), 1U);
+  EXPECT_EQ(events_[0].phase, 2);
+  EXPECT_EQ(events_[0].number, first);
+  EXPECT_NEAR(events_[0].magnitude, 0.8, 0.3);
+  EXPECT_EQ(status_.active.size(), 1U);
+
+  body_.loss_ratio[2] = 0.0;
+  fly(8, false);
+  fly(25);
+  body_.loss_ratio[0] = 0.6;
+  fly(1);
+  EXPECT_EQ(events_.back().component, "rotor 1");
+  EXPECT_EQ(events_.back().phase, 1);
+  EXPECT_GT(events_.back().number, first);
+  EXPECT_EQ(status_.active.size(), 2U);
+}
+
+/// No rotor is ever told from the others.
+class AmbiguousActuatorServiceTest : public ActuatorServiceTest {
+ protected:
+  AmbiguousActuatorServiceTest() : ActuatorServiceTest{1e9} {}
+};
+
+TEST_F(AmbiguousActuatorServiceTest, WhatIsNotNamedIsOneFaultWhicheverRotorIsMostLikely) {
+  for (const std::size_t rotor : {2U, 0U}) {
+    fly(25);
+    body_.loss_ratio[rotor] = 0.6;
+    fly(1);
+    ASSERT_EQ(status_.active.size(), 1U);
+    EXPECT_EQ(status_.active[0].component, "propulsion");
+    EXPECT_EQ(status_.active[0].number, 1);
+    EXPECT_THAT(status_.active[0].summary, HasSubstr("most likely rotor " + std::to_string(rotor + 1)));
+    body_.loss_ratio[rotor] = 0.0;
+    fly(8, false);
+  }
 }
 
 TEST_F(ActuatorServiceTest, PublishesTheCompensatedStateFiftyTimesASecond) {

@@ -38,6 +38,8 @@ class Flight {
         monitor.on_rotor_commands(now(), std::span{body.command_ratio}.first(body.vehicle.rotor_count));
         monitor.on_rotor_speeds(now(), std::span{body.speed_rad_s}.first(body.vehicle.rotor_count));
       }
+      if (freeze_gyro) body.gyro_rad_s = *freeze_gyro;
+      for (std::size_t axis = 0; axis < 3; ++axis) body.gyro_rad_s[axis] += spike_rad_s;
       (void)monitor.on_imu({now(), body.accel_m_s2, body.gyro_rad_s}, phase);
       for (std::size_t r = 0; r < monitor.rotors().size(); ++r) {
         if (monitor.rotors()[r].transition != Transition::kRaise) continue;
@@ -55,6 +57,8 @@ class Flight {
 
   HoveringMultirotor body;
   ActuatorMonitor monitor;
+  std::optional<std::array<double, 3>> freeze_gyro;
+  double spike_rad_s = 0;  ///< on all axes of the gyro
   std::optional<std::size_t> named;
   LossVerdict verdict;
   double raised_s = 0;
@@ -191,6 +195,62 @@ TEST(ActuatorMonitor, AFaultOutlivesALanding) {
   EXPECT_EQ(flight.raised, 1);  // latched: raised before, and not again
 }
 
+TEST(ActuatorMonitor, ARepairedRotorIsForgottenOnTheGround) {
+  for (const std::size_t next : {0U, 2U}) {
+    Flight flight{4};
+    flight.fly(30);
+    flight.body.loss_ratio[0] = 0.5;
+    flight.fly(2);
+    ASSERT_EQ(flight.named, 0U);
+    flight.fly(4, Phase::kOnGround);
+    flight.body.loss_ratio[0] = 0.0;
+    for (const LossVerdict& rotor : flight.monitor.rotors()) EXPECT_EQ(rotor.baseline, 0.0);
+    flight.fly(30);
+    EXPECT_EQ(flight.raised, 1);
+    flight.named.reset();
+    flight.body.loss_ratio[next] = next == 0 ? 0.6 : 0.4;
+    flight.fly(2);
+    EXPECT_EQ(flight.raised, 2) << next;
+    EXPECT_EQ(flight.named, next);
+    EXPECT_EQ(flight.axis_raised, 0);
+  }
+}
+
+TEST(ActuatorMonitor, ARotorThatIsNotRepairedBlamesNoOther) {
+  Flight flight{4};
+  flight.fly(30);
+  flight.body.loss_ratio[3] = 0.5;
+  flight.fly(2);
+  flight.fly(60, Phase::kOnGround);
+  flight.named.reset();
+  flight.fly(60);
+  EXPECT_EQ(flight.named.value_or(3), 3U);
+}
+
+TEST(ActuatorMonitor, ATouchOfTheGroundForgetsNothing) {
+  Flight flight{4};
+  flight.body.loss_ratio[0] = 0.1;
+  flight.fly(30);
+  const double baseline = flight.monitor.rotors()[0].baseline;
+  ASSERT_GT(baseline, 0.05);
+  for (int i = 0; i < 5; ++i) {
+    flight.fly(2.5, Phase::kOnGround);
+    flight.fly(0.5, Phase::kTakeOff);
+  }
+  EXPECT_EQ(flight.monitor.rotors()[0].baseline, baseline);
+}
+
+TEST(ActuatorMonitor, AFreshBatteryIsNotJudgedByTheOldOne) {
+  Flight flight{4};
+  for (std::size_t i = 0; i < 4; ++i) flight.body.loss_ratio[i] = 0.2;  // all alike: less thrust per command
+  flight.fly(30);
+  ASSERT_EQ(flight.raised, 0);
+  EXPECT_NEAR(flight.monitor.axis_states()[kHeight].commanded, 0.8 * 9.81, 0.4);
+  flight.fly(4, Phase::kOnGround);
+  flight.fly(HoveringMultirotor::kStep_s);
+  EXPECT_NEAR(flight.monitor.axis_states()[kHeight].commanded, 9.81, 0.4);
+}
+
 TEST(ActuatorMonitor, RefusesWhatIsNoSampleAndNoticesSilence) {
   Flight flight{4};
   EXPECT_EQ(flight.monitor.state(), DetectorState::kInitialising);
@@ -236,9 +296,113 @@ TEST(ActuatorMonitor, AClockThatJumpsForwardStartsTheFlightAnewAndBlamesNobody) 
   EXPECT_EQ(flight.raised + flight.axis_raised, 0);
 }
 
+TEST(ActuatorMonitor, ABadGyroSampleBlamesNobody) {
+  for (const double spike_rad_s : {10.0, -34.0, 34.0, 199.0}) {
+    for (const double duration_s : {0.002, 0.04}) {
+      Flight flight{4, 3};
+      flight.fly(30);
+      const double gamma = flight.monitor.rotors()[0].gamma;
+      flight.spike_rad_s = spike_rad_s;
+      flight.fly(duration_s);
+      flight.spike_rad_s = 0;
+      EXPECT_EQ(flight.monitor.outliers(), std::lround(duration_s / HoveringMultirotor::kStep_s));
+      EXPECT_NEAR(flight.monitor.rotors()[0].gamma, gamma, 0.05);
+      flight.fly(5);
+      EXPECT_EQ(flight.raised + flight.axis_raised, 0) << spike_rad_s << ' ' << duration_s;
+    }
+  }
+}
+
+TEST(ActuatorMonitor, BadAccelerationsAreNoForce) {
+  Flight flight{4, 3};
+  flight.fly(30);
+  const AxisState before = flight.monitor.axis_states()[kHeight];
+  for (int i = 0; i < 20; ++i) {
+    flight.body.step();
+    const double bad_m_s2 = i % 2 == 0 ? 1500.0 : -1500.0;
+    EXPECT_EQ(
+        flight.monitor.on_imu({flight.now(), {0.0, 0.0, bad_m_s2}, flight.body.gyro_rad_s}, Phase::kInFlight),
+        UpdateStatus::kFused);
+    EXPECT_NEAR(flight.monitor.axis_states()[kHeight].rate, before.rate, 0.2);
+  }
+  EXPECT_GT(flight.monitor.axis_states()[kHeight].rate_sigma, 1.5 * before.rate_sigma);
+  EXPECT_EQ(flight.monitor.outliers(), 20);
+}
+
+TEST(ActuatorMonitor, RefusesWhatNoSensorGives) {
+  Flight flight{4, 3};
+  flight.fly(10);
+  const TimePoint time = flight.now() + from_seconds(0.002);
+  for (const double beyond : {1e4, -1e4, 1e200}) {
+    EXPECT_EQ(flight.monitor.on_imu({time, flight.body.accel_m_s2, {0.0, 0.0, beyond}}, Phase::kInFlight),
+              UpdateStatus::kOutOfRange);
+    EXPECT_EQ(flight.monitor.on_imu({time, {beyond, 0.0, -9.8}, flight.body.gyro_rad_s}, Phase::kInFlight),
+              UpdateStatus::kOutOfRange);
+  }
+  EXPECT_EQ(flight.monitor.refused(), 6);
+  flight.fly(5);
+  EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+}
+
+TEST(ActuatorMonitor, WhatNoLossExplainsIsBlamedOnNobodyAndBounded) {
+  Flight flight{4, 3};
+  flight.fly(30);
+  flight.body.loss_ratio[1] = 3.5;  // it pulls down
+  bool is_implausible = false;
+  for (int i = 0; i < 500; ++i) {
+    flight.fly(HoveringMultirotor::kStep_s);
+    for (const LossVerdict& rotor : flight.monitor.rotors()) {
+      ASSERT_GE(std::min(rotor.gamma, rotor.test_gamma), kLeastLoss);
+      ASSERT_LE(std::max(rotor.gamma, rotor.test_gamma), kMostLoss);
+      is_implausible = is_implausible || rotor.reason == NotJudged::kImplausible;
+    }
+    for (const LossVerdict& axis : flight.monitor.axes()) ASSERT_LE(std::abs(axis.gamma), kMostLoss);
+  }
+  EXPECT_TRUE(is_implausible);
+}
+
+TEST(ActuatorMonitor, AGyroThatFreezesForAMomentBlamesNobody) {
+  Flight flight{4, 3};
+  flight.body.excitation = 4.0;
+  flight.fly(30);
+  for (int i = 0; i < 20; ++i) {
+    flight.freeze_gyro = flight.body.gyro_rad_s;
+    const double sigma_rad_s = flight.monitor.axis_states()[kRoll].rate_sigma;
+    flight.fly(0.1);
+    ASSERT_GT(flight.monitor.axis_states()[kRoll].rate_sigma, 2.0 * sigma_rad_s);
+    ASSERT_NEAR(flight.monitor.axis_states()[kRoll].rate, flight.body.rates_rad_s[0], 0.3);
+    flight.freeze_gyro.reset();
+    flight.fly(0.9);
+    ASSERT_EQ(flight.monitor.state(), DetectorState::kMonitoring);
+  }
+  EXPECT_EQ(flight.monitor.repeated(), 20 * 50);
+  EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+}
+
+TEST(ActuatorMonitor, AGyroThatStaysFrozenMutesAndTheFlightStartsAnewAfterIt) {
+  Flight flight{4, 3};
+  flight.fly(30);
+  flight.freeze_gyro = flight.body.gyro_rad_s;
+  flight.fly(0.11);
+  EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kFrozen);
+  EXPECT_EQ(flight.monitor.rotors()[0].reason, NotJudged::kFrozen);
+  flight.fly(20);
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kFrozen);
+  flight.freeze_gyro.reset();
+  flight.fly(1);
+  EXPECT_EQ(flight.monitor.reason(), NotJudged::kConverging);
+  flight.fly(25);
+  EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+  flight.body.loss_ratio[2] = 0.6;
+  flight.fly(1);
+  EXPECT_EQ(flight.named, 2U);
+}
+
 TEST(ActuatorMonitor, OneStampOfTheFutureCostsTenSamplesNotAnHour) {
   Flight flight{4};
   flight.fly(20);
+  flight.body.step();
   const TimePoint future = flight.now() + std::chrono::hours{1};
   EXPECT_EQ(flight.monitor.on_imu({future, flight.body.accel_m_s2, flight.body.gyro_rad_s}, Phase::kInFlight),
             UpdateStatus::kFused);
@@ -254,6 +418,7 @@ TEST(ActuatorMonitor, OneStampOfTheFutureCostsTenSamplesNotAnHour) {
   flight.body.loss_ratio[1] = 0.6;
   flight.fly(1);
   EXPECT_EQ(flight.named, 1U);
+  EXPECT_EQ(flight.monitor.outliers(), 0);
 }
 
 TEST(ActuatorMonitor, AStampOfTheFutureAsTheLastIsSilence) {

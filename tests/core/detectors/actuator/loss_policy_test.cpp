@@ -68,6 +68,24 @@ TEST(LossPolicy, ClearsWithHysteresisUnlessLatched) {
   }
 }
 
+TEST(LossPolicy, RearmedItRaisesALatchedFaultAgainAndKeepsOneThatCanClear) {
+  for (const bool latched : {false, true}) {
+    LossPolicyParams params = kParams;
+    params.life_cycle.latched = latched;
+    LossPolicy policy{params};
+    for (int i = 0; i < 20; ++i) (void)policy.step(0.5, 0.05, true, at(0.01 * i));
+    ASSERT_TRUE(policy.active());
+    policy.pause(at(10.0));
+    policy.rearm();
+    EXPECT_EQ(policy.active(), !latched);
+    int raised = 0;
+    for (int i = 0; i < 20; ++i)
+      raised += policy.step(0.5, 0.05, true, at(20.0 + 0.01 * i)) == Transition::kRaise ? 1 : 0;
+    EXPECT_EQ(raised, latched ? 1 : 0);
+    EXPECT_TRUE(policy.active());
+  }
+}
+
 TEST(LossPolicy, APauseIsNoEvidence) {
   LossPolicy policy{kParams};
   (void)policy.step(0.5, 0.05, true, at(0.0));
