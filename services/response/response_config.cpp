@@ -183,6 +183,7 @@ ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
       params.warm_only[index] = term.optional<bool>("warm_only", false);
     }
   }
+  params.least_sigma = table.optional<double>("least_sigma", 0.0, Range{0.0, 1e9});
   params.evidence = read_evidence(table);
   if (params.evidence.alternative == Alternative::kShift) {
     params.side =

@@ -42,7 +42,7 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
     return verdict;
   }
   verdict.expected = prediction.expected;
-  verdict.sigma = prediction.sigma;
+  verdict.sigma = std::max(prediction.sigma, params_.least_sigma);
   if (status == UpdateStatus::kConverging || flown < params_.warm_up) return verdict;
   verdict.reason = NotJudged::kJudged;
   for (int i = 0; i < params_.term_count; ++i) {
@@ -75,7 +75,7 @@ ChannelVerdict ResponseChannel::pause(const SignalFrame& frame, double tick_s, T
   if (Regression::Prediction prediction;
       regression_.predict(x, verdict.observed, prediction) == UpdateStatus::kFused) {
     verdict.expected = prediction.expected;
-    verdict.sigma = prediction.sigma;
+    verdict.sigma = std::max(prediction.sigma, params_.least_sigma);
   }
   regression_.drop_unlearned();
   if (life_cycle_.active()) {

@@ -27,6 +27,8 @@ struct ChannelParams {
   Side side = Side::kBoth;                   ///< shift: which deviation is a fault
   EvidenceParams evidence;
   double warm_drift_sigmas = 1.75;  ///< shift: k₀ in place of evidence.drift_sigmas after a warm start
+  double least_sigma =
+      0.0;  ///< the spread of a prediction is never taken to be less, however quiet the flight
   DelayedRegressionParams regression;
   CusumParams cusum;
   FaultLifeCycleParams life_cycle;

@@ -525,6 +525,23 @@ TEST(ResponseMonitor, AFaultThatWasFoundOutlastsTheLanding) {
   EXPECT_GE(found[1].at_s, 105.0) << "healthy for 5 s in flight";
 }
 
+TEST(ResponseMonitor, WhatIsSmallerThanItsLeastSigmaIsNoFault) {
+  for (const bool is_floored : {false, true}) {
+    MonitorParams params = thrust_only();
+    if (is_floored) params.channels[0].least_sigma = 0.75;  // three times the noise
+    for (const double lost_m_s2 : {0.8, 2.5}) {
+      ResponseMonitor monitor{params};
+      Flight flight{1};
+      flight.fault_at_s = 60.0;
+      flight.lost_accel_m_s2 = lost_m_s2;
+      EXPECT_EQ(flight.fly(monitor, 80.0).empty(), is_floored && lost_m_s2 < 1.0) << lost_m_s2;
+      if (is_floored) {
+        EXPECT_EQ(monitor.verdicts()[0].sigma, 0.75);
+      }
+    }
+  }
+}
+
 TEST(ResponseMonitor, AFixedWingHasNoFlightPhase) {
   ResponseMonitor told{thrust_only()};
   ResponseMonitor untold{thrust_only()};
