@@ -104,9 +104,9 @@ Score score(const Flight& flight, const Rules& rules) {
   std::optional<TimePoint> last_counted;
   bool is_first_false = false;
   for (const Alarm& alarm : flight.alarms) {
-    if (alarm.time < armed) continue;
     const bool is_false = std::none_of(faulty.begin(), faulty.end(),
                                        [&](const Interval& one) { return contains(one, alarm.time); });
+    if (is_false && alarm.time < armed) continue;
     if (!result.first) {
       result.first = alarm;
       is_first_false = is_false;

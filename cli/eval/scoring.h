@@ -11,7 +11,7 @@ namespace airworthy::eval {
 
 struct Rules {
   std::string detector = "response";  ///< only what it watches is to be found
-  Duration warm_up{20'000'000};       ///< alarms so early in a flight, and that time, do not count
+  Duration warm_up{20'000'000};       ///< healthy time so early in a flight, and alarms in it, do not count
   Duration onset_tolerance{0};        ///< an alarm so long before the onset still counts as finding the fault
   Duration aftermath{10'000'000};     ///< an alarm so long after the end of a fault is still its alarm
   Duration rearm{5'000'000};          ///< alarms closer together are one false alarm

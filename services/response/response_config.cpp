@@ -183,6 +183,7 @@ ChannelParams read_channel(ConfigTable table, double tick_s, Duration warm_up) {
       params.warm_only[index] = term.optional<bool>("warm_only", false);
     }
   }
+  params.least_sigma = table.optional<double>("least_sigma", 0.0, Range{0.0, 1e9});
   params.evidence = read_evidence(table);
   if (params.evidence.alternative == Alternative::kShift) {
     params.side =
@@ -219,7 +220,9 @@ rt::Expected<ResponseConfig> load_from(const std::string& path, const std::vecto
   auto file = rt::ConfigFile::load(path, overrides);
   ConfigTable root = file.root();
   ResponseConfig config;
-  config.vehicle = rt::VehicleFile::named_by(root).name;
+  const rt::VehicleFile vehicle = rt::VehicleFile::named_by(root);
+  config.vehicle = vehicle.name;
+  config.multirotor = vehicle.multirotor;
 
   ConfigTable input = root.table("input");
   config.imu_sensor_id = input.optional<int>("imu_sensor_id", 0, Range{0, 127});
@@ -227,6 +230,8 @@ rt::Expected<ResponseConfig> load_from(const std::string& path, const std::vecto
   MonitorParams& monitor = config.monitor;
   monitor.pace =
       input.choice<Pace>("pace", {{"imu", Pace::kInertial}, {"attitude", Pace::kAttitude}}, Pace::kInertial);
+  // Where the attitude sets the pace there is too little inertial data to tell the phase by.
+  monitor.needs_flight_phase = vehicle.multirotor.has_value() && monitor.pace == Pace::kInertial;
   monitor.tick_period = from_seconds(tick_s);
   monitor.longest_gap = from_seconds(input.optional<double>("longest_gap_s", 1.0, Range{0.1, 60.0}));
   monitor.input_timeout = from_seconds(input.optional<double>("input_timeout_s", 2.0, Range{0.1, 60.0}));

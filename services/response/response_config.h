@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/detectors/response/response_monitor.h"
+#include "core/vehicle/multirotor.h"
 #include "runtime/config/config_file.h"
 #include "runtime/detector/fault_reporter.h"
 
@@ -23,6 +25,7 @@ struct ChannelMeaning {
 struct ResponseConfig {
   std::string vehicle;
   std::string hash;
+  std::optional<Multirotor> multirotor;  ///< the flight phase needs it
   int imu_sensor_id = 0;
   MonitorParams monitor;
   std::vector<ChannelMeaning> channels;  ///< in the order of monitor.channels

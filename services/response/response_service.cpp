@@ -16,28 +16,20 @@ std::vector<evidence_t> evidence_of(const ChannelVerdict& verdict, const std::st
           evidence("innovation_sigma", verdict.sigma, unit), evidence("test_ratio", verdict.test_ratio, "1")};
 }
 
-std::string reason_of(Pace pace, DetectorState state, Muted muted, NotJudged reason) {
-  const std::string data = pace == Pace::kInertial ? "inertial data" : "attitude data";
-  if (state == DetectorState::kInitialising) return "no " + data + " yet";
-  if (muted == Muted::kNotFlying) return "not flying";
-  if (muted == Muted::kInputStale) return data + " stale";
-  switch (reason) {
-    case NotJudged::kConverging:
-      return "converging: still learning this flight";
-    case NotJudged::kInputUnknown:
-      return "attitude, set-point or guidance data missing or stale";
-    case NotJudged::kJudged:
-      break;
-  }
-  return "";
-}
-
 }  // namespace
 
 ResponseService::ResponseService(rt::Node& node, const ResponseConfig& config)
     : node_{node}, config_{config}, monitor_{config.monitor}, reporter_{node, "response", [this] {
                                                                           return report();
                                                                         }} {
+  // Before the service's own subscriptions: what it must know of a sample has been queued.
+  if (config.monitor.needs_flight_phase) {
+    phase_.emplace(node, *config.multirotor);
+    node_.subscribe<esc_status_t>(channel::kEscStatus, [this](const esc_status_t& message) {
+      if (message.speed_rpm.size() != config_.multirotor->rotor_count)
+        node_.counters().add("speeds.wrong_rotor_count");
+    });
+  }
   node_.subscribe<imu_t>(channel::kImu, [this](const imu_t& message) { on_imu(message); });
   node_.subscribe<attitude_t>(channel::kAttitude,
                               [this](const attitude_t& message) { on_attitude(message); });
@@ -58,6 +50,7 @@ void ResponseService::on_imu(const imu_t& message) {
     sample.accel_m_s2[axis] = message.accel_m_s2[axis];
     sample.gyro_rad_s[axis] = message.gyro_rad_s[axis];
   }
+  if (phase_) monitor_.on_phase(phase_->advance_to(sample.time).phase());
   if (monitor_.on_imu(sample)) handle_tick();
 }
 
@@ -81,6 +74,8 @@ void ResponseService::on_setpoint(const attitude_setpoint_t& message) {
 }
 
 void ResponseService::on_rotor_command(const rotor_command_t& message) {
+  if (phase_ && message.command_ratio.size() != config_.multirotor->rotor_count)
+    node_.counters().add("commands.wrong_rotor_count");
   monitor_.on_rotor_command(from_us(message.header.time_us), message.command_ratio);
 }
 
@@ -113,19 +108,42 @@ void ResponseService::handle_verdict(std::size_t channel, const ChannelVerdict& 
   reporter_.report(channel, verdict.transition, monitor_.tick_time(), fault);
 }
 
+std::string ResponseService::reason_of(NotJudged reason) const {
+  const std::string data = config_.monitor.pace == Pace::kInertial ? "inertial data" : "attitude data";
+  if (monitor_.state() == DetectorState::kInitialising) return "no " + data + " yet";
+  switch (monitor_.muted()) {
+    case Muted::kNotFlying:
+      return "not flying";
+    case Muted::kNotInFlight:
+      return fmt::format("not in flight: {}", name_of(monitor_.muted_phase()));
+    case Muted::kInputStale:
+      return data + " stale";
+    case Muted::kNo:
+      break;
+  }
+  switch (reason) {
+    case NotJudged::kConverging:
+      return "converging: still learning this flight";
+    case NotJudged::kInputUnknown:
+      return "attitude, set-point or guidance data missing or stale";
+    case NotJudged::kPaused:
+    case NotJudged::kJudged:
+      break;
+  }
+  return "";
+}
+
 rt::DetectorReport ResponseService::report() const {
   rt::DetectorReport report;
   report.state = monitor_.state();
-  if (report.state == DetectorState::kMuted)
-    report.muted_reason = reason_of(config_.monitor.pace, report.state, monitor_.muted(), NotJudged::kJudged);
+  if (report.state == DetectorState::kMuted) report.muted_reason = reason_of(NotJudged::kJudged);
   const auto verdicts = monitor_.verdicts();
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     const bool judged =
         report.state == DetectorState::kMonitoring && verdicts[i].reason == NotJudged::kJudged;
-    component_assessment_t assessment = rt::assessment(
-        config_.channels[i].component,
-        judged ? "" : reason_of(config_.monitor.pace, report.state, monitor_.muted(), verdicts[i].reason),
-        evidence_of(verdicts[i], config_.channels[i].unit));
+    component_assessment_t assessment =
+        rt::assessment(config_.channels[i].component, judged ? "" : reason_of(verdicts[i].reason),
+                       evidence_of(verdicts[i], config_.channels[i].unit));
     assessment.judged = judged ? 1 : 0;
     report.components.push_back(std::move(assessment));
   }

@@ -1,14 +1,17 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "airworthy/attitude_setpoint_t.hpp"
 #include "airworthy/attitude_t.hpp"
+#include "airworthy/esc_status_t.hpp"
 #include "airworthy/flight_state_t.hpp"
 #include "airworthy/imu_t.hpp"
 #include "airworthy/rotor_command_t.hpp"
 #include "core/detectors/response/response_monitor.h"
 #include "runtime/detector/fault_reporter.h"
+#include "runtime/phase/flight_phase_input.h"
 #include "runtime/process/node.h"
 #include "services/response/response_config.h"
 
@@ -35,10 +38,13 @@ class ResponseService {
   void on_flight_state(const flight_state_t& message);
   void handle_tick();
   void handle_verdict(std::size_t channel, const ChannelVerdict& verdict);
+  /// Empty while the component is judged.
+  [[nodiscard]] std::string reason_of(NotJudged reason) const;
   [[nodiscard]] rt::DetectorReport report() const;
 
   rt::Node& node_;
   const ResponseConfig& config_;
+  std::optional<rt::FlightPhaseInput> phase_;  ///< of a multirotor
   ResponseMonitor monitor_;
   rt::FaultReporter reporter_;
   std::function<void(const ResponseMonitor&)> observer_;

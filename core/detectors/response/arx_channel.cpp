@@ -84,13 +84,25 @@ ChannelVerdict ArxChannel::step(TimePoint now, Duration flown, bool muted) noexc
     variance_sum_ += verdict.sigma * verdict.sigma;
     ++innovation_count_;
   }
-  verdict.onset = onset_;
-  if (innovation_count_ > 0) {
-    const auto count = static_cast<double>(innovation_count_);
-    verdict.mean_innovation = innovation_sum_ / count;
-    verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
-  }
+  tell_magnitude(verdict);
   return verdict;
+}
+
+ChannelVerdict ArxChannel::pause(TimePoint now) noexcept {
+  restart_history();
+  ChannelVerdict verdict;
+  verdict.reason = NotJudged::kPaused;
+  if (life_cycle_.active()) verdict.transition = life_cycle_.step(1.0, now);
+  tell_magnitude(verdict);
+  return verdict;
+}
+
+void ArxChannel::tell_magnitude(ChannelVerdict& verdict) const noexcept {
+  verdict.onset = onset_;
+  if (innovation_count_ == 0) return;
+  const auto count = static_cast<double>(innovation_count_);
+  verdict.mean_innovation = innovation_sum_ / count;
+  verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
 }
 
 }  // namespace airworthy::response

@@ -60,6 +60,10 @@ class ArxChannel {
   /// the flight time seen so far. With `muted` there is no evidence, and the history starts anew.
   ChannelVerdict step(TimePoint now, Duration flown, bool muted) noexcept;
 
+  /// One tick of a multirotor that is not in flight, in place of step(): no evidence, the history starts anew, and what
+  /// was found stays found.
+  ChannelVerdict pause(TimePoint now) noexcept;
+
   /// After a gap in the input: past values and what is not yet judged are dropped, what was learned stays.
   void restart_history() noexcept {
     past_count_ = 0;
@@ -81,6 +85,7 @@ class ArxChannel {
     double test_ratio = 0;
   };
 
+  void tell_magnitude(ChannelVerdict& verdict) const noexcept;
   void judge(TimePoint time, double output, const Rls::Innovation& innovation) noexcept;
   void remember(double input, double output) noexcept;
 

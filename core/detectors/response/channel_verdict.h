@@ -8,7 +8,12 @@
 namespace airworthy::response {
 
 /// Why a channel gives no verdict at a tick.
-enum class NotJudged : std::uint8_t { kJudged, kConverging, kInputUnknown };
+enum class NotJudged : std::uint8_t {
+  kJudged,
+  kConverging,
+  kInputUnknown,
+  kPaused,  ///< by the monitor, which knows why
+};
 
 /// The verdict of one tick with all that a reader needs to recompute it.
 struct ChannelVerdict {

@@ -15,18 +15,24 @@ ResponseChannel::ResponseChannel(const ChannelParams& params) noexcept
   for (std::size_t i = 0; i < regressors_.size(); ++i) regressors_[i] = Regressor{params.terms[i]};
 }
 
-ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, TimePoint now, Duration flown,
-                                     bool muted) noexcept {
-  ChannelVerdict verdict;
-  verdict.observed = response_.step(frame, tick_s);
+ResponseChannel::Regression::Vector ResponseChannel::read(const SignalFrame& frame, double tick_s,
+                                                          double& observed) noexcept {
+  observed = response_.step(frame, tick_s);
   auto x = x_;
   for (int i = 0; i < params_.term_count; ++i) {
     const auto term = static_cast<std::size_t>(i);
     x_(i) = x(i) = regressors_[term].step(frame, tick_s);
     if (params_.warm_only[term] && !warm_) x(i) = 0;
   }
+  return x;
+}
 
-  decltype(regression_)::Prediction prediction;
+ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, TimePoint now, Duration flown,
+                                     bool muted) noexcept {
+  ChannelVerdict verdict;
+  const auto x = read(frame, tick_s, verdict.observed);
+
+  Regression::Prediction prediction;
   const bool frozen = muted || life_cycle_.active();  // what a fault does must not become what is expected
   const UpdateStatus status = frozen ? regression_.predict(x, verdict.observed, prediction)
                                      : regression_.update(x, verdict.observed, prediction);
@@ -36,7 +42,7 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
     return verdict;
   }
   verdict.expected = prediction.expected;
-  verdict.sigma = prediction.sigma;
+  verdict.sigma = std::max(prediction.sigma, params_.least_sigma);
   if (status == UpdateStatus::kConverging || flown < params_.warm_up) return verdict;
   verdict.reason = NotJudged::kJudged;
   for (int i = 0; i < params_.term_count; ++i) {
@@ -58,17 +64,32 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
     high_.reset();
     regression_.drop_unlearned();
   }
-  verdict.onset = onset_;
-  if (innovation_count_ > 0) {
-    const auto count = static_cast<double>(innovation_count_);
-    verdict.mean_innovation = innovation_sum_ / count;
-    verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
+  tell_magnitude(verdict);
+  return verdict;
+}
+
+ChannelVerdict ResponseChannel::pause(const SignalFrame& frame, double tick_s, TimePoint now) noexcept {
+  ChannelVerdict verdict;
+  verdict.reason = NotJudged::kPaused;
+  const auto x = read(frame, tick_s, verdict.observed);
+  if (Regression::Prediction prediction;
+      regression_.predict(x, verdict.observed, prediction) == UpdateStatus::kFused) {
+    verdict.expected = prediction.expected;
+    verdict.sigma = std::max(prediction.sigma, params_.least_sigma);
   }
+  regression_.drop_unlearned();
+  if (life_cycle_.active()) {
+    verdict.test_ratio = std::max(low_.test_ratio(), high_.test_ratio());
+    verdict.transition = life_cycle_.step(1.0, now);
+  } else {
+    low_.reset();
+    high_.reset();
+  }
+  tell_magnitude(verdict);
   return verdict;
 }
 
 bool ResponseChannel::warm_start(const ChannelPrior& prior) noexcept {
-  using Regression = decltype(regression_);
   auto theta = Regression::Vector{params_.term_count};
   auto gram = Regression::Matrix{params_.term_count, params_.term_count};
   auto next = prior.gram.begin();
@@ -106,6 +127,14 @@ void ResponseChannel::track_magnitude(const ChannelVerdict& verdict) noexcept {
   innovation_sum_ += verdict.observed - verdict.expected;
   variance_sum_ += verdict.sigma * verdict.sigma;
   ++innovation_count_;
+}
+
+void ResponseChannel::tell_magnitude(ChannelVerdict& verdict) const noexcept {
+  verdict.onset = onset_;
+  if (innovation_count_ == 0) return;
+  const auto count = static_cast<double>(innovation_count_);
+  verdict.mean_innovation = innovation_sum_ / count;
+  verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
 }
 
 }  // namespace airworthy::response

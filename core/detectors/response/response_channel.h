@@ -27,6 +27,8 @@ struct ChannelParams {
   Side side = Side::kBoth;                   ///< shift: which deviation is a fault
   EvidenceParams evidence;
   double warm_drift_sigmas = 1.75;  ///< shift: k₀ in place of evidence.drift_sigmas after a warm start
+  double least_sigma =
+      0.0;  ///< the spread of a prediction is never taken to be less, however quiet the flight
   DelayedRegressionParams regression;
   CusumParams cusum;
   FaultLifeCycleParams life_cycle;
@@ -44,6 +46,11 @@ class ResponseChannel {
   ChannelVerdict step(const SignalFrame& frame, double tick_s, TimePoint now, Duration flown,
                       bool muted) noexcept;
 
+  /// One tick of a multirotor that is not in flight, in place of step(). Nothing is learned and no evidence gathered;
+  /// what a landing left of either is dropped, so that it does not count in the next flight. What was found stays
+  /// found, for nobody looks.
+  ChannelVerdict pause(const SignalFrame& frame, double tick_s, TimePoint now) noexcept;
+
   /// From now on expects, tests and alarms by what earlier flights say, until this flight says more. False
   /// where the prior does not fit the channel or is no prior: nothing changes then.
   [[nodiscard]] bool warm_start(const ChannelPrior& prior) noexcept;
@@ -59,13 +66,18 @@ class ResponseChannel {
   [[nodiscard]] const BoundedVector<double, kMostTerms>& regressors() const noexcept { return x_; }
 
  private:
+  using Regression = DelayedRegression<double, kMostTerms, kMostLearningDelayTicks>;
+
+  /// Steps all delays. x of the newest tick, with 0 for terms that count only after a warm start.
+  [[nodiscard]] Regression::Vector read(const SignalFrame& frame, double tick_s, double& observed) noexcept;
+  void tell_magnitude(ChannelVerdict& verdict) const noexcept;
   void accumulate(const ChannelVerdict& verdict, TimePoint now) noexcept;
   void track_magnitude(const ChannelVerdict& verdict) noexcept;
 
   ChannelParams params_;
   Regressor response_;
   std::array<Regressor, kMostTerms> regressors_;
-  DelayedRegression<double, kMostTerms, kMostLearningDelayTicks> regression_;
+  Regression regression_;
   BoundedVector<double, kMostTerms> x_;
   bool warm_ = false;
   Cusum low_;   ///< evidence of a downward shift, or of a lost gain

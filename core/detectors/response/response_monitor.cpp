@@ -102,6 +102,11 @@ void ResponseMonitor::on_flight_state(const FlightState& state) noexcept {
   flight_state_known_ = true;
 }
 
+void ResponseMonitor::on_phase(Phase phase) noexcept {
+  phase_ = phase;
+  if (phase != Phase::kInFlight) tick_phase_ = phase;
+}
+
 void ResponseMonitor::on_clock(TimePoint now) noexcept {
   silent_ = started_ && now - last_sample_ > params_.longest_gap;
 }
@@ -142,6 +147,7 @@ void ResponseMonitor::restart(TimePoint now) noexcept {
 
 void ResponseMonitor::sample_arx(Samples samples, TimePoint time) noexcept {
   if (muted_ != Muted::kNo || !measured_.known || !setpoint_.known) return;
+  if (params_.needs_flight_phase && phase_ != Phase::kInFlight) return;
   if (time - std::min(measured_.time, setpoint_.time) > params_.input_timeout) return;
   SignalFrame signals;
   signals[Signal::kRoll] = measured_.roll_rad;
@@ -182,17 +188,29 @@ void ResponseMonitor::finish_attitude_tick(TimePoint now) noexcept {
 
 void ResponseMonitor::judge_tick(TimePoint now, Duration elapsed) noexcept {
   tick_time_ = now;
-  muted_ = flying() ? Muted::kNo : Muted::kNotFlying;
+  muted_ = take_muted();
   if (muted_ == Muted::kNo) flown_ += elapsed;
   choose_configuration();
   signals_ = frame(now);
-  for (int i = 0; i < params_.channel_count; ++i) {
-    const auto channel = static_cast<std::size_t>(i);
-    const bool silent = muted_ != Muted::kNo;
-    verdicts_[channel] = params_.methods[channel] == Method::kArx
-                             ? arx_[channel].step(now, flown_, silent)
-                             : channels_[channel].step(signals_, to_seconds(elapsed), now, flown_, silent);
+  const bool silent = muted_ != Muted::kNo;
+  const double tick_s = to_seconds(elapsed);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(params_.channel_count); ++i) {
+    const bool is_arx = params_.methods[i] == Method::kArx;
+    if (silent && params_.needs_flight_phase) {
+      verdicts_[i] = is_arx ? arx_[i].pause(now) : channels_[i].pause(signals_, tick_s, now);
+    } else {
+      verdicts_[i] = is_arx ? arx_[i].step(now, flown_, silent)
+                            : channels_[i].step(signals_, tick_s, now, flown_, silent);
+    }
   }
+}
+
+Muted ResponseMonitor::take_muted() noexcept {
+  const Phase phase = std::exchange(tick_phase_, phase_);
+  if (!flying()) return Muted::kNotFlying;
+  if (!params_.needs_flight_phase || phase == Phase::kInFlight) return Muted::kNo;
+  muted_phase_ = phase;
+  return Muted::kNotInFlight;
 }
 
 void ResponseMonitor::choose_configuration() noexcept {

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/detectors/detector_state.h"
+#include "core/detectors/flight_phase.h"
 #include "core/detectors/response/arx_channel.h"
 #include "core/detectors/response/response_channel.h"
 #include "core/estimators/attitude_propagator.h"
@@ -27,6 +28,7 @@ struct MonitorParams {
   Duration longest_gap{1'000'000};    ///< a longer silence of what sets the pace restarts all delays
   Duration input_timeout{2'000'000};  ///< attitude, set-point and flight state older than this are unknown
   double min_groundspeed_m_s = 0;     ///< slower is not flying; 0 = not asked
+  bool needs_flight_phase = false;    ///< a multirotor: judges only while on_phase() says in flight
   int channel_count = 0;
   std::array<ChannelParams, kMostChannels> channels{};
   std::array<Method, kMostChannels> methods{};
@@ -37,7 +39,12 @@ struct MonitorParams {
   double airspeed_sensor_above_m_s = 3.0;   ///< an airspeed sensor that works reads more than this in flight
 };
 
-enum class Muted : std::uint8_t { kNo, kNotFlying, kInputStale };
+enum class Muted : std::uint8_t {
+  kNo,
+  kNotFlying,    ///< disarmed, reported on the ground, or too slow
+  kNotInFlight,  ///< by the flight phase
+  kInputStale,
+};
 
 struct ImuSample {
   TimePoint time;
@@ -77,12 +84,18 @@ class ResponseMonitor {
   void on_rotor_command(TimePoint time, std::span<const double> command_ratio) noexcept;
   void on_flight_state(const FlightState& state) noexcept;
 
+  /// The flight phase at the next sample of what sets the pace, with `needs_flight_phase`. A tick during any part of
+  /// which it was not in flight is not judged.
+  void on_phase(Phase phase) noexcept;
+
   /// Judges silence, on the gateway's clock: with no sample of what sets the pace for `longest_gap` the monitor is muted.
   /// Evidence is not touched, so the verdicts never depend on how ticks and samples interleave.
   void on_clock(TimePoint now) noexcept;
 
   [[nodiscard]] DetectorState state() const noexcept;
   [[nodiscard]] Muted muted() const noexcept { return silent_ ? Muted::kInputStale : muted_; }
+  /// The phase for which the newest tick was muted.
+  [[nodiscard]] Phase muted_phase() const noexcept { return muted_phase_; }
   [[nodiscard]] TimePoint tick_time() const noexcept { return tick_time_; }
   [[nodiscard]] std::span<const ChannelVerdict> verdicts() const noexcept {
     return {verdicts_.data(), static_cast<std::size_t>(params_.channel_count)};
@@ -121,6 +134,7 @@ class ResponseMonitor {
   void sample_arx(Samples samples, TimePoint time) noexcept;
   [[nodiscard]] SignalFrame frame(TimePoint now) const noexcept;
   [[nodiscard]] bool flying() const noexcept;
+  [[nodiscard]] Muted take_muted() noexcept;
 
   MonitorParams params_;
   // optional<ResponseChannel> would do; default parameters make unused channels cheap instead.
@@ -147,6 +161,9 @@ class ResponseMonitor {
   double euler_pitch_rate_ = 0;
   SignalFrame signals_;
   Duration flown_{0};
+  Phase phase_ = Phase::kUnknown;
+  Phase tick_phase_ = Phase::kUnknown;  ///< in flight only if it was so since the last tick
+  Phase muted_phase_ = Phase::kUnknown;
   Muted muted_ = Muted::kNo;
   bool silent_ = false;
   bool airspeed_sensor_ = false;

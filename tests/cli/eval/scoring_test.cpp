@@ -62,6 +62,13 @@ TEST(Score, TheWarmUpDoesNotCount) {
   EXPECT_EQ(score(flight(10, {}), {}).healthy_s, 0.0);
 }
 
+TEST(Score, AFaultFoundInTheWarmUpIsFound) {
+  EXPECT_EQ(score(flight(10, {5, 11}), {}).outcome, Outcome::kTruePositive);
+  EXPECT_NEAR(score(flight(10, {5, 11, 30}), {}).delay_s, 1.0, 1e-6);
+  EXPECT_EQ(score(flight(10, {5, 11}), {}).false_alarms, 0);
+  EXPECT_EQ(score(flight(10, {5}), {}).outcome, Outcome::kFalseNegative);
+}
+
 TEST(Score, FalseAlarmsAreCountedOncePerRearmTime) {
   EXPECT_EQ(score(flight(std::nullopt, {30, 34.9, 35.1, 40.2}), {}).false_alarms, 3);
   EXPECT_EQ(score(flight(60, {30, 50, 61}), {}).false_alarms, 2);

@@ -57,6 +57,24 @@ TEST_F(ResponseConfigTest, TheShippedFilesOfOtherVehiclesAreValid) {
   }
 }
 
+TEST_F(ResponseConfigTest, AMultirotorThatIsDescribedIsJudgedByItsFlightPhase) {
+  const auto load = [](const char* file, const char* vehicle) {
+    return ResponseConfig::load(std::string{AIRWORTHY_SOURCE_DIR "/config/"} + file,
+                                {std::string{"vehicle=" AIRWORTHY_SOURCE_DIR "/config/"} + vehicle});
+  };
+  const auto multirotor = load("response_multirotor.toml", "vehicles/f450.toml");
+  ASSERT_TRUE(multirotor) << multirotor.error().text;
+  EXPECT_TRUE(multirotor->monitor.needs_flight_phase);
+  ASSERT_TRUE(multirotor->multirotor);
+  EXPECT_EQ(multirotor->multirotor->rotor_count, 4U);
+  const auto fixed_wing = load("response_multirotor.toml", "vehicle.toml");
+  ASSERT_TRUE(fixed_wing) << fixed_wing.error().text;
+  EXPECT_FALSE(fixed_wing->monitor.needs_flight_phase);
+  const auto by_attitude = load("response_elevon.toml", "vehicles/f450.toml");
+  ASSERT_TRUE(by_attitude) << by_attitude.error().text;
+  EXPECT_FALSE(by_attitude->monitor.needs_flight_phase) << "too little inertial data to tell it by";
+}
+
 TEST_F(ResponseConfigTest, EveryProblemIsReportedAtOnce) {
   EXPECT_EQ(
       error_of(R"(vehicle = "vehicle.toml"

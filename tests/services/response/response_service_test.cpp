@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -10,6 +11,8 @@
 #include "runtime/bus/channels.h"
 #include "runtime/bus/lcm_bus.h"
 #include "runtime/clock/manual_clock.h"
+#include "sim/output/log_output.h"
+#include "sim/simulation.h"
 
 namespace airworthy::response {
 namespace {
@@ -213,6 +216,88 @@ TEST_F(ResponseServiceTest, TheOtherInertialUnitIsNotListenedTo) {
   settle();
   EXPECT_EQ(status_.components[0].evidence[0].value, before);
 }
+
+/// A simulated quadrotor that takes off and lands every twenty seconds, on an in-process bus.
+class ResponseServiceLandings : public ::testing::TestWithParam<std::uint64_t> {
+ protected:
+  ResponseServiceLandings() {
+    observer_.subscribe<fault_event_t>(channel::kFaultEvent,
+                                       [this](const fault_event_t& event) { events_.push_back(event); });
+    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
+                                           [this](const detector_status_t& status) { status_ = status; });
+  }
+
+  static ResponseConfig f450() {
+    auto config = ResponseConfig::load(AIRWORTHY_CONFIG "/response_multirotor.toml",
+                                       {"vehicle=" AIRWORTHY_CONFIG "/vehicles/f450.toml"});
+    EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
+    return *config;
+  }
+
+  static sim::Scenario landings() {
+    auto scenario = sim::Scenario::load(AIRWORTHY_CONFIG "/scenarios/landings.toml", 4);
+    EXPECT_TRUE(scenario.has_value()) << (scenario ? "" : scenario.error().text);
+    return *scenario;
+  }
+
+  void fly_until(double time_s) {
+    while (simulation_.time_s() < time_s) {
+      simulation_.step(output_);
+      while (*bus_->dispatch(100) > 0) {
+      }
+      clock_.advance_to(clock_.now() + Duration{2'000});
+    }
+  }
+
+  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
+  rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
+  rt::Log log_{"test", rt::LogLevel::kError};
+  ResponseConfig config_ = f450();
+  sim::LogOutput output_{*bus_, config_.vehicle, 4, 1};
+  sim::Simulation simulation_{*config_.multirotor, landings(), sim::Realism::at(sim::Level::kHard),
+                              GetParam()};
+  rt::Node observer_{*bus_, clock_, log_, {config_.vehicle, "observer", 4}};
+  rt::Node node_{*bus_, clock_, log_, {config_.vehicle, "airworthy-response", 5}};
+  ResponseService service_{node_, config_};
+  std::vector<fault_event_t> events_;
+  detector_status_t status_;
+};
+
+// By the attitude errors alone every one of these flights has an alarm when the ground takes the vehicle over.
+TEST_P(ResponseServiceLandings, AreNoFaults) {
+  fly_until(2.0);
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMuted));
+  EXPECT_THAT(status_.muted_reason, "not flying") << "reported on the ground";
+  fly_until(51.0);  // in the third flight, enough of it seen
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMonitoring)) << status_.muted_reason;
+  EXPECT_EQ(status_.components.at(0).judged, 1);
+  fly_until(56.0);
+  EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMuted));
+  EXPECT_THAT(status_.muted_reason, "not in flight: landing");
+  EXPECT_EQ(status_.components.at(0).judged, 0);
+  EXPECT_EQ(status_.components.at(0).reason, status_.muted_reason);
+  fly_until(120.0);
+  EXPECT_TRUE(events_.empty()) << events_.front().component << ": " << events_.front().summary << " at "
+                               << events_.front().header.time_us;
+}
+
+// They leave the phase unknown: whoever reads the log must learn why.
+TEST_P(ResponseServiceLandings, OfAnotherNumberOfRotorsAreCounted) {
+  rt::Node driver{*bus_, clock_, log_, {config_.vehicle, "driver", 7}};
+  auto commands = driver.advertise(channel::kRotorCommand);
+  rotor_command_t command{};
+  command.rotor_count = 6;
+  command.command_ratio.assign(6, 0.5);
+  commands.publish(command, sim::LogOutput::vehicle_time(0.0));
+  fly_until(1.0);
+  const auto counter =
+      std::find_if(status_.counters.begin(), status_.counters.end(),
+                   [](const counter_t& one) { return one.name == "commands.wrong_rotor_count"; });
+  ASSERT_NE(counter, status_.counters.end());
+  EXPECT_EQ(counter->value, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, ResponseServiceLandings, ::testing::Values(1, 2, 3));
 
 }  // namespace
 }  // namespace airworthy::response

@@ -147,6 +147,30 @@ TEST(ArxChannel, SilentInHealthAndFindsALostGainAtTheNextCommand) {
   }
 }
 
+TEST(ArxChannel, WhatWasFoundStaysFoundWhilePaused) {
+  Rig rig{second_order()};
+  for (int i = 0; i < 1000; ++i) (void)rig.step();
+  rig.pair.gain = 0.0;
+  while (rig.step().transition != Transition::kRaise) {
+  }
+  rig.pair.gain = 1.0;
+  for (int i = 0; i < 60; ++i) (void)rig.step();  // 3 of the 5 s that clear it
+  int updates = 0;
+  for (int i = 0; i < 200; ++i) {
+    rig.now += kStep;
+    const ChannelVerdict verdict = rig.channel.pause(rig.now);
+    EXPECT_EQ(verdict.reason, NotJudged::kPaused);
+    ASSERT_NE(verdict.transition, Transition::kClear) << i;
+    updates += verdict.transition == Transition::kUpdate ? 1 : 0;
+  }
+  EXPECT_NEAR(updates, 10, 1);
+  int until_clear = 0;
+  while (rig.step().transition != Transition::kClear && ++until_clear < 1000) {
+  }
+  EXPECT_GE(until_clear, 100) << "5 s must be healthy in one piece, and seen";
+  EXPECT_LT(until_clear, 400);
+}
+
 TEST(ArxChannel, NotArmedBeforeItHasSeenEnoughOrSettled) {
   Rig rig{second_order()};
   for (int i = 0; i < 201; ++i) {

@@ -34,6 +34,13 @@ MonitorParams thrust_only() {
   return params;
 }
 
+MonitorParams multirotor_thrust_only() {
+  MonitorParams params = thrust_only();
+  params.min_groundspeed_m_s = 0.0;
+  params.needs_flight_phase = true;
+  return params;
+}
+
 // What many flights like those of Flight teach: its very coefficients.
 ChannelPrior thrust_prior() {
   ChannelPrior prior;
@@ -402,6 +409,152 @@ TEST(ResponseMonitor, AnUnknownGroundspeedDoesNotMute) {
   flight.groundspeed_m_s = kNan;
   flight.fault_at_s = 60.0;
   EXPECT_EQ(flight.fly(monitor, 70.0).size(), 1U);
+}
+
+// Says the phase before each sample: in flight but from `landed_s` until `started_s`.
+struct Landing {
+  double landed_s = 0.0;
+  double started_s = 0.0;
+
+  void apply(Flight& flight) const {
+    flight.before_sample = [*this](ResponseMonitor& monitor, double t) {
+      monitor.on_phase(t < landed_s || t >= started_s ? Phase::kInFlight : Phase::kLanding);
+    };
+  }
+};
+
+TEST(ResponseMonitor, AMultirotorIsJudgedInFlightOnly) {
+  ResponseMonitor monitor{multirotor_thrust_only()};
+  Flight flight{6};
+  flight.fault_at_s = 60.0;  // as the ground does what no command asked for
+  Landing{60.0, 1e9}.apply(flight);
+  EXPECT_TRUE(flight.fly(monitor, 70.0).empty());
+  EXPECT_EQ(monitor.state(), DetectorState::kMuted);
+  EXPECT_EQ(monitor.muted(), Muted::kNotInFlight);
+  EXPECT_EQ(monitor.muted_phase(), Phase::kLanding);
+  EXPECT_EQ(monitor.verdicts()[0].reason, NotJudged::kPaused);
+}
+
+TEST(ResponseMonitor, AMultirotorOfUnknownPhaseIsNotJudged) {
+  ResponseMonitor monitor{multirotor_thrust_only()};
+  Flight flight{6};
+  flight.fault_at_s = 60.0;
+  EXPECT_TRUE(flight.fly(monitor, 70.0).empty());
+  EXPECT_EQ(monitor.muted(), Muted::kNotInFlight);
+  EXPECT_EQ(monitor.muted_phase(), Phase::kUnknown);
+}
+
+TEST(ResponseMonitor, ATickPartlyOnTheGroundIsNotJudged) {
+  ResponseMonitor monitor{multirotor_thrust_only()};
+  bool touched = true;  // since the last tick; not in flight before it is said
+  int muted = 0;
+  for (int i = 0; i < 2000; ++i) {  // about ten samples a tick
+    const Phase phase = i % 100 == 55 ? Phase::kContact : Phase::kInFlight;
+    monitor.on_phase(phase);
+    touched = touched || phase == Phase::kContact;
+    if (!monitor.on_imu({from_us(1'000'000 + i * 10'000), {0.5, 0.0, -9.81}, {}})) continue;
+    ASSERT_EQ(monitor.muted(), touched ? Muted::kNotInFlight : Muted::kNo) << i;
+    muted += touched ? 1 : 0;
+    touched = false;
+  }
+  EXPECT_EQ(muted, 21);
+  EXPECT_EQ(monitor.muted_phase(), Phase::kContact);
+}
+
+TEST(ResponseMonitor, ALandingTakesNoEvidenceIntoTheNextFlight) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    ResponseMonitor monitor{multirotor_thrust_only()};
+    Flight flight{seed};
+    // Half of what an alarm takes comes before a landing, half after the next take-off.
+    flight.fault_at_s = 60.0;
+    flight.heals_at_s = 70.2;
+    flight.lost_accel_m_s2 = 10.0;
+    Landing{60.2, 70.0}.apply(flight);
+    EXPECT_TRUE(flight.fly(monitor, 90.0).empty()) << "seed " << seed;
+  }
+  ResponseMonitor monitor{multirotor_thrust_only()};
+  Flight flight{1};
+  flight.fault_at_s = 60.0;
+  flight.heals_at_s = 60.4;
+  flight.lost_accel_m_s2 = 10.0;
+  Landing{1e9, 1e9}.apply(flight);
+  EXPECT_FALSE(flight.fly(monitor, 90.0).empty()) << "both halves in one flight are an alarm";
+}
+
+TEST(ResponseMonitor, NothingIsLearnedOnTheGround) {
+  ResponseMonitor monitor{multirotor_thrust_only()};
+  Flight flight{2};
+  flight.fault_at_s = 60.0;
+  flight.heals_at_s = 180.0;
+  Landing{60.0, 180.0}.apply(flight);
+  EXPECT_TRUE(flight.fly(monitor, 240.0).empty());
+  ResponseMonitor airborne{multirotor_thrust_only()};
+  Flight same{2};
+  Landing{1e9, 1e9}.apply(same);
+  EXPECT_TRUE(same.fly(airborne, 240.0).empty());
+  EXPECT_NEAR(monitor.verdicts()[0].expected, airborne.verdicts()[0].expected, 0.1)
+      << "1.5 m/s² were lost for two minutes";
+  EXPECT_NEAR(monitor.verdicts()[0].sigma, airborne.verdicts()[0].sigma, 0.05);
+}
+
+TEST(ResponseMonitor, WhatBeganBeforeALandingWasSeenIsNotLearnedEither) {
+  ResponseMonitor touched{multirotor_thrust_only()};
+  ResponseMonitor untouched{multirotor_thrust_only()};
+  Flight flight{2};
+  Flight same{2};
+  flight.fault_at_s = 59.0;
+  flight.heals_at_s = 60.0;
+  flight.lost_accel_m_s2 = -10.0;  // more of it is no fault here
+  for (Flight* one : {&flight, &same}) Landing{60.0, 70.0}.apply(*one);
+  EXPECT_TRUE(flight.fly(touched, 120.0).empty());
+  EXPECT_TRUE(same.fly(untouched, 120.0).empty());
+  EXPECT_EQ(touched.verdicts()[0].expected, untouched.verdicts()[0].expected);
+  EXPECT_EQ(touched.verdicts()[0].sigma, untouched.verdicts()[0].sigma);
+}
+
+TEST(ResponseMonitor, AFaultThatWasFoundOutlastsTheLanding) {
+  ResponseMonitor monitor{multirotor_thrust_only()};
+  Flight flight{3};
+  flight.fault_at_s = 60.0;
+  flight.heals_at_s = 63.0;
+  Landing{66.0, 100.0}.apply(flight);  // when 5 s without evidence have begun
+  const auto found = flight.fly(monitor, 130.0);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_LT(found[0].at_s, 62.0);
+  EXPECT_EQ(found[1].transition, Transition::kClear);
+  EXPECT_GE(found[1].at_s, 105.0) << "healthy for 5 s in flight";
+}
+
+TEST(ResponseMonitor, WhatIsSmallerThanItsLeastSigmaIsNoFault) {
+  for (const bool is_floored : {false, true}) {
+    MonitorParams params = thrust_only();
+    if (is_floored) params.channels[0].least_sigma = 0.75;  // three times the noise
+    for (const double lost_m_s2 : {0.8, 2.5}) {
+      ResponseMonitor monitor{params};
+      Flight flight{1};
+      flight.fault_at_s = 60.0;
+      flight.lost_accel_m_s2 = lost_m_s2;
+      EXPECT_EQ(flight.fly(monitor, 80.0).empty(), is_floored && lost_m_s2 < 1.0) << lost_m_s2;
+      if (is_floored) {
+        EXPECT_EQ(monitor.verdicts()[0].sigma, 0.75);
+      }
+    }
+  }
+}
+
+TEST(ResponseMonitor, AFixedWingHasNoFlightPhase) {
+  ResponseMonitor told{thrust_only()};
+  ResponseMonitor untold{thrust_only()};
+  Flight flight{4};
+  Flight same{4};
+  flight.fault_at_s = same.fault_at_s = 60.0;
+  flight.before_sample = [](ResponseMonitor& monitor, double) { monitor.on_phase(Phase::kContact); };
+  const auto found = flight.fly(told, 70.0);
+  const auto also = same.fly(untold, 70.0);
+  ASSERT_EQ(found.size(), 1U);
+  ASSERT_EQ(also.size(), 1U);
+  EXPECT_EQ(found[0].at_s, also[0].at_s);
+  EXPECT_EQ(told.verdicts()[0].test_ratio, untold.verdicts()[0].test_ratio);
 }
 
 TEST(ResponseMonitor, MissingAttitudeIsNotJudged) {
