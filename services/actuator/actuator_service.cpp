@@ -24,6 +24,10 @@ std::string reason_of(NotJudged reason, double sigma) {
   switch (reason) {
     case NotJudged::kNoInput:
       return "inertial data, or rotor speeds and commands, missing";
+    case NotJudged::kInputTooSlow:
+      return "rotor speeds or commands come too seldom or too late: axes need commands every 30 ms or speeds "
+             "every "
+             "15 ms, rotors a quarter of that rate";
     case NotJudged::kNotFlying:
       return "not in free flight";
     case NotJudged::kFrozen:

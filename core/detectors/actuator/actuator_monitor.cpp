@@ -40,7 +40,8 @@ constexpr double kAxisDisturbanceTime_s = 5.0;
 constexpr double kAngleNoise_rad_sqrt_s = 0.005;
 constexpr double kClimbNoise_m_s_sqrt_s = 0.2;
 constexpr double kNotMeasured_variance = 1e8;  // what did not come has no weight
-constexpr double kLeast_variance = 1e-12;      // keeps a covariance positive where no time has passed
+constexpr double kDiffusionTime_s = 1.0;
+constexpr double kLeast_variance = 1e-12;  // keeps a covariance positive where no time has passed
 
 double square(double x) { return x * x; }
 
@@ -161,6 +162,7 @@ DetectorState ActuatorMonitor::state() const noexcept {
   if (!has_time_) return DetectorState::kInitialising;
   switch (reason_) {
     case NotJudged::kNoInput:
+    case NotJudged::kInputTooSlow:
     case NotJudged::kNotFlying:
     case NotJudged::kFrozen:
       return DetectorState::kMuted;
@@ -186,6 +188,7 @@ void ActuatorMonitor::learn_thrust_ratio(double dt_s) noexcept {
 }
 
 NotJudged ActuatorMonitor::obstacle(Phase phase) const noexcept {
+  if (thrust_.is_too_slow()) return NotJudged::kInputTooSlow;
   if (!thrust_.is_known()) return NotJudged::kNoInput;
   if (phase != Phase::kInFlight) return NotJudged::kNotFlying;
   const Duration repeats = std::max(gyro_.repeats_for(now_), accel_.repeats_for(now_));
@@ -271,11 +274,7 @@ bool ActuatorMonitor::estimate(const std::array<double, 3>& gyro_rad_s, double d
   if (!has_gyro_) body.rate_rad_s = {x(0), x(1), x(2)};
   body.known_rad_s2 = gyroscopic(body.rate_rad_s);
   find_thrusts(body);
-  const RotorThrust::Speeds missed = thrust_.take_missed_m_s();
-  missed_.setZero();
-  for (std::size_t j = 0; j < params_.vehicle.rotor_count; ++j) {
-    missed_ += mixing_.col(static_cast<int>(j)) * missed[j];
-  }
+  find_missed(dt_s);
   if (estimate_rotors(body, dt_s) != UpdateStatus::kFused) return false;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     if (estimate_axis(axis, body, dt_s) != UpdateStatus::kFused) return false;
@@ -283,6 +282,21 @@ bool ActuatorMonitor::estimate(const std::array<double, 3>& gyro_rad_s, double d
   has_new_angle_ = false;
   climb_m_s_ = std::numeric_limits<double>::quiet_NaN();
   return true;
+}
+
+void ActuatorMonitor::find_missed(double dt_s) noexcept {  // (5)
+  const RotorThrust::Missed missed = thrust_.take_missed();
+  AxisVector impulse = AxisVector::Zero();
+  for (std::size_t j = 0; j < params_.vehicle.rotor_count; ++j) {
+    impulse += mixing_.col(static_cast<int>(j)) * missed.impulse_m_s[j];
+  }
+  missed_variance_ = impulse.cwiseAbs2();
+  if (missed.period_s > 0.0) {
+    const double period3_s3 = missed.period_s * missed.period_s * missed.period_s;
+    const double share = missed.period_s / (missed.period_s + kDiffusionTime_s);
+    input_diffusion_ += share * (4.0 * missed_variance_ / period3_s3 - input_diffusion_);
+  }
+  missed_variance_ += dt_s * thrust_.unknown_s2() * input_diffusion_;
 }
 
 // A rotor that moves along its axis meets less air or more: thrust · (1 − inflow · axial airspeed / tip speed).
@@ -326,7 +340,7 @@ UpdateStatus ActuatorMonitor::estimate_rotors(const Body& body, double dt_s) noe
     model.a(4 + axis, 4 + axis) = keep;
     model.noise(4 + axis, 4 + axis) = square(disturbance) * (1.0 - keep * keep);
     model.noise(axis, axis) = square(kWhiteShare * disturbance * share) +
-                              (is_height ? 0.0 : square(missed_(axis))) + kLeast_variance;
+                              (is_height ? 0.0 : missed_variance_(axis)) + kLeast_variance;
     measurement.c(axis, axis) = 1.0;
     const double commanded = (mixing_.row(axis) * model.u).value();
     measurement.noise(axis, axis) = is_height ? accel_variance() : rate_variance(commanded);
@@ -375,7 +389,7 @@ ActuatorMonitor::AxisObserver::Transition ActuatorMonitor::axis_transition(std::
   model.noise(0, 0) =
       square(is_height ? kClimbNoise_m_s_sqrt_s : kAngleNoise_rad_sqrt_s) * dt_s + kLeast_variance;
   model.noise(1, 1) =
-      square(kWhiteShare * disturbance * share) + (is_height ? 0.0 : square(missed_(row))) + kLeast_variance;
+      square(kWhiteShare * disturbance * share) + (is_height ? 0.0 : missed_variance_(row)) + kLeast_variance;
   model.noise(2, 2) = square(disturbance) * (1.0 - keep * keep);
   model.fault_noise_variance(0) = square(params_.drift_sigma_1_sqrt_s) * dt_s;
   return model;
@@ -526,6 +540,7 @@ void ActuatorMonitor::judge_axes() noexcept {
     verdict.sigma = verdict.test_sigma = std::sqrt(axis_observers_[axis]->fault_covariance()(0, 0));
     const bool is_seen = verdict.sigma <= params_.axis_judged_sigma;
     verdict.reason = reason_ == NotJudged::kConverging ? NotJudged::kConverging
+                     : !thrust_.is_prompt()            ? NotJudged::kInputTooSlow
                      : !is_seen                        ? NotJudged::kNotExcited
                      : is_loss(verdict.gamma)          ? NotJudged::kJudged
                                                        : NotJudged::kImplausible;

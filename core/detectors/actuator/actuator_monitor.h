@@ -53,6 +53,7 @@ struct ActuatorMonitorParams {
 enum class NotJudged : std::uint8_t {
   kJudged,
   kNoInput,        ///< neither speed nor command of the rotors
+  kInputTooSlow,   ///< rotor speeds or commands come too seldom or too late
   kNotFlying,      ///< the phase of flight forbids it
   kFrozen,         ///< the inertial unit repeats its values
   kConverging,     ///< not yet long enough in flight
@@ -103,6 +104,8 @@ struct MonitorSample {
 ///           ω' = ω + Δt·(M·(s − S·γ) + d + gyroscopic);  f' = f + a·(M_f·(s − S·γ) + d_f − f)
 ///   Axes    x = [angle, rate, d], u = the sum of M·s on that axis; y = [angle, rate], each axis by itself   (2)
 ///           height: [climb, f, d], climb' = climb + Δt·(f·cos φ·cos θ − g)
+///   Input   between its samples the commanded acceleration wanders: D is the mean square of its changes over their time;
+///           of an input that is not prompt, D·(delay² − that of a prompt one) is white noise of the rates         (5)
 ///   f is the specific force upward after the low-pass of the accelerometer, a = 1 − exp(−Δt/τ); d: disturbances,
 ///   first-order Gauss-Markov; on the axes so strong that only a *varying* u tells γ. s: rotor_thrust.h, less the inflow
 ///   of a rotor that moves along its axis. Noise of the rates: what the inputs may have missed between their samples, and
@@ -120,6 +123,7 @@ struct MonitorSample {
 /// What γ beyond [−1, 2] would explain is no loss: it is not raised, and the bound is published with the reason.
 /// A sample that SampleCheck does not take is no measurement: the observers go on by their models alone. What repeats for
 /// longer than 0.1 s mutes, and the flight's estimates start anew after it.
+/// Axes are judged by prompt input only, for a command that acts late looks like one without effect.
 /// In a phase other than flight nothing is estimated, and each flight starts anew. Once the vehicle has stood on the ground
 /// for 3 s it may have been repaired: baselines, thrust per command and latched rotors are forgotten, and what is found in
 /// the next flight is raised again. Whether that is news to the operator is for who publishes it to say.
@@ -177,6 +181,7 @@ class ActuatorMonitor {
   void check_sensors(const MonitorSample& sample) noexcept;
   void learn_thrust_ratio(double dt_s) noexcept;
   [[nodiscard]] bool estimate(const std::array<double, 3>& gyro_rad_s, double dt_s) noexcept;
+  void find_missed(double dt_s) noexcept;
   void find_thrusts(const Body& body) noexcept;
   [[nodiscard]] UpdateStatus estimate_rotors(const Body& body, double dt_s) noexcept;
   [[nodiscard]] UpdateStatus estimate_axis(std::size_t axis, const Body& body, double dt_s) noexcept;
@@ -213,7 +218,8 @@ class ActuatorMonitor {
   double thrust_ratio_ = 1.0;
   std::array<double, kMaxRotors> specific_thrust_m_s2_{};
   using AxisVector = Eigen::Matrix<double, static_cast<int>(kAxes), 1>;
-  AxisVector missed_ = AxisVector::Zero();  ///< rad/s
+  AxisVector missed_variance_ = AxisVector::Zero();  ///< rad²/s²
+  AxisVector input_diffusion_ = AxisVector::Zero();  ///< D of (5), rad²/s⁵
   double seen_variance_ = 0.0;
   std::array<double, kMaxRotors> explained_{};  ///< log-likelihood, (3)
   double accel_up_m_s2_ = 0.0;

@@ -34,10 +34,11 @@ class Flight {
     const int steps = static_cast<int>(std::lround(seconds / HoveringMultirotor::kStep_s));
     for (int i = 0; i < steps; ++i) {
       body.step();
-      if (++steps_ % 2 == 0) {
+      ++steps_;
+      if (steps_ % command_every == 0)
         monitor.on_rotor_commands(now(), std::span{body.command_ratio}.first(body.vehicle.rotor_count));
+      if (steps_ % speed_every == 0)
         monitor.on_rotor_speeds(now(), std::span{body.speed_rad_s}.first(body.vehicle.rotor_count));
-      }
       if (freeze_gyro) body.gyro_rad_s = *freeze_gyro;
       for (std::size_t axis = 0; axis < 3; ++axis) body.gyro_rad_s[axis] += spike_rad_s;
       (void)monitor.on_imu({now(), body.accel_m_s2, body.gyro_rad_s}, phase);
@@ -57,6 +58,8 @@ class Flight {
 
   HoveringMultirotor body;
   ActuatorMonitor monitor;
+  int command_every = 2;  ///< steps
+  int speed_every = 2;
   std::optional<std::array<double, 3>> freeze_gyro;
   double spike_rad_s = 0;  ///< on all axes of the gyro
   std::optional<std::size_t> named;
@@ -441,6 +444,35 @@ TEST(ActuatorMonitor, WithoutRotorInputItSaysSo) {
                          Phase::kInFlight);
   }
   EXPECT_EQ(monitor.reason(), NotJudged::kNoInput);
+}
+
+TEST(ActuatorMonitor, WithSlowInputNoAxisIsJudgedAndALostRotorIsNamed) {
+  for (const int every : {2, 25, 50}) {  // 4, 50 and 100 ms
+    Flight flight{4, 3};
+    flight.body.excitation = 6.0;
+    flight.command_every = every;
+    flight.fly(40);
+    EXPECT_EQ(flight.raised + flight.axis_raised, 0) << every;
+    EXPECT_EQ(flight.monitor.axes()[kRoll].reason,
+              every == 2 ? NotJudged::kJudged : NotJudged::kInputTooSlow);
+    EXPECT_EQ(flight.monitor.rotors()[0].reason, NotJudged::kJudged);
+    flight.body.loss_ratio[0] = 0.9;
+    flight.fly(2);
+    EXPECT_EQ(flight.named, 0U) << every;
+  }
+}
+
+TEST(ActuatorMonitor, InputThatIsTooSlowMutes) {
+  for (const InputSource source : {InputSource::kCommand, InputSource::kSpeed, InputSource::kAuto}) {
+    Flight flight{4, 3, source};
+    flight.command_every = flight.speed_every = 65;  // 130 ms
+    flight.body.loss_ratio[0] = 0.9;
+    flight.fly(10);
+    EXPECT_EQ(flight.monitor.state(), DetectorState::kMuted);
+    EXPECT_EQ(flight.monitor.reason(), NotJudged::kInputTooSlow);
+    EXPECT_EQ(flight.monitor.rotors()[0].reason, NotJudged::kInputTooSlow);
+    EXPECT_EQ(flight.raised + flight.axis_raised, 0);
+  }
 }
 
 TEST(ActuatorMonitor, TimeShiftChangesNothingAndNoHeapIsUsed) {

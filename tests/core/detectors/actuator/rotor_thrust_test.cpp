@@ -61,14 +61,105 @@ TEST(RotorThrust, SpeedsCorrectCommandsSlowlyAndNotBeyondAFifth) {
   EXPECT_NEAR(thrust.speed_rad_s(2), 500.0, 1e-6);
 }
 
-TEST(RotorThrust, SpeedsAloneAreFollowed) {
+TEST(RotorThrust, SpeedsAloneAreTheSpeeds) {
   RotorThrust thrust{vehicle(), InputSource::kSpeed};
-  for (int i = 0; i <= 1000; ++i) {
-    thrust.on_commands(at(0.001 * i), std::array{1.0, 1.0, 1.0});
-    thrust.on_speeds(at(0.001 * i), std::array{-450.0, kNan, 1e9});  // signed, not reported, not a speed
-    thrust.advance(at(0.001 * i), 0.001);
+  for (int i = 0; i <= 100; ++i) {
+    thrust.on_commands(at(0.01 * i), std::array{1.0, 1.0, 1.0});
+    thrust.on_speeds(at(0.01 * i), std::array{-450.0, 300.0 + i, 500.0});  // signed
+    thrust.on_speeds(at(0.01 * i), std::array{kNan, kNan, 1e9});           // not reported, not a speed
+    thrust.advance(at(0.01 * i), 0.01);
+    ASSERT_EQ(thrust.speed_rad_s(0), 450.0);
+    ASSERT_EQ(thrust.speed_rad_s(1), 300.0 + i);
+    ASSERT_EQ(thrust.speed_rad_s(2), 500.0);
   }
-  EXPECT_NEAR(thrust.speed_rad_s(0), 450.0, 1e-3);
+  EXPECT_TRUE(thrust.is_known());
+  EXPECT_TRUE(thrust.is_prompt());
+}
+
+TEST(RotorThrust, ARotorThatDoesNotReportIsUnknownWithoutCommandsAndNotCorrectedWithThem) {
+  RotorThrust speeds{vehicle(), InputSource::kSpeed};
+  RotorThrust both{vehicle(), InputSource::kAuto};
+  for (int i = 0; i <= 1000; ++i) {
+    for (RotorThrust* thrust : {&speeds, &both}) {
+      thrust->on_commands(at(0.01 * i), std::array{0.5, 0.5, 0.5});
+      thrust->on_speeds(at(0.01 * i), std::array{500.0, kNan, i < 500 ? 500.0 : kNan});
+      thrust->advance(at(0.01 * i), 0.01);
+      ASSERT_NEAR(thrust->speed_rad_s(0), 500.0, 1e-9);
+    }
+    ASSERT_FALSE(speeds.is_known());
+    ASSERT_TRUE(speeds.is_too_slow());
+    ASSERT_NEAR(both.speed_rad_s(1), 500.0, 1e-9);
+    ASSERT_NEAR(both.speed_rad_s(2), 500.0, 1e-9);
+    ASSERT_TRUE(both.is_known());
+  }
+}
+
+/// Inertial samples at 500 Hz, and inputs that come every `period_s` and arrive `late_s` after their stamp.
+struct Inputs {
+  double command_period_s = 0.0;  ///< 0 = none
+  double speed_period_s = 0.0;
+  double late_s = 0.0;
+
+  void run(RotorThrust& thrust, double duration_s = 10.0) const {
+    const auto is_due = [](int step, double period_s) {
+      return period_s > 0.0 && step % static_cast<int>(std::lround(period_s * 500.0)) == 0;
+    };
+    for (int i = 0; i < static_cast<int>(duration_s * 500.0); ++i) {
+      const TimePoint stamp = at(0.002 * i - late_s);
+      if (is_due(i, command_period_s)) thrust.on_commands(stamp, std::array{0.5, 0.5, 0.5});
+      if (is_due(i, speed_period_s)) thrust.on_speeds(stamp, std::array{450.0, 500.0, 500.0});
+      thrust.advance(at(0.002 * i), 0.002);
+    }
+  }
+};
+
+TEST(RotorThrust, TellsWhetherItsInputIsPromptSlowOrTooSlow) {
+  struct Case {
+    Inputs inputs;
+    bool is_known;
+    bool is_prompt;
+    double delay_s;  ///< that unknown_s2() is of; 0 = none
+    double prompt_s;
+  };
+  for (const auto& [inputs, is_known, is_prompt, delay_s, prompt_s] :
+       {Case{{0.004, 0.0, 0.0}, true, true, 0.0, 0.0}, Case{{0.020, 0.0, 0.0}, true, true, 0.0, 0.0},
+        Case{{0.050, 0.0, 0.0}, true, false, 0.050, 0.03}, Case{{0.100, 0.0, 0.0}, true, false, 0.1, 0.03},
+        Case{{0.130, 0.0, 0.0}, false, false, 0.0, 0.0}, Case{{0.020, 0.0, 0.02}, true, false, 0.038, 0.03},
+        Case{{0.0, 0.010, 0.0}, true, true, 0.0, 0.0}, Case{{0.0, 0.010, 0.02}, true, false, 0.028, 0.015},
+        Case{{0.0, 0.050, 0.0}, true, false, 0.050, 0.015},
+        Case{{0.0, 0.100, 0.0}, false, false, 0.0, 0.0}}) {
+    RotorThrust thrust{vehicle(), InputSource::kAuto};
+    inputs.run(thrust);
+    SCOPED_TRACE(::testing::Message()
+                 << inputs.command_period_s << ' ' << inputs.speed_period_s << ' ' << inputs.late_s);
+    EXPECT_EQ(thrust.is_known(), is_known);
+    EXPECT_EQ(thrust.is_too_slow(), !is_known);
+    EXPECT_EQ(thrust.is_prompt(), is_prompt);
+    EXPECT_NEAR(thrust.unknown_s2(), delay_s * delay_s - prompt_s * prompt_s, 2e-5);
+  }
+}
+
+TEST(RotorThrust, SpeedsReplaceCommandsThatComeTooSeldom) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  Inputs{.command_period_s = 0.1, .speed_period_s = 0.01}.run(thrust);
+  EXPECT_TRUE(thrust.is_prompt());
+  EXPECT_EQ(thrust.speed_rad_s(0), 450.0);
+  RotorThrust slower{vehicle(), InputSource::kAuto};
+  Inputs{.command_period_s = 0.05, .speed_period_s = 0.05}.run(slower);  // the commands are less too slow
+  EXPECT_NEAR(slower.unknown_s2(), 0.05 * 0.05 - 0.03 * 0.03, 1e-9);
+  EXPECT_GT(slower.speed_rad_s(0), 450.0);
+}
+
+TEST(RotorThrust, InputThatStopsIsHeldForAQuarterOfASecond) {
+  RotorThrust thrust{vehicle(), InputSource::kAuto};
+  Inputs{.command_period_s = 0.004}.run(thrust, 1.0);
+  thrust.advance(at(1.24), 0.1);
+  EXPECT_TRUE(thrust.is_known());
+  thrust.advance(at(1.26), 0.1);
+  EXPECT_FALSE(thrust.is_known());
+  EXPECT_TRUE(thrust.is_too_slow());
+  thrust.advance(at(1.6), 0.1);
+  EXPECT_FALSE(thrust.is_too_slow());
 }
 
 TEST(RotorThrust, CountsWhatItRefuses) {
@@ -130,10 +221,12 @@ TEST(RotorThrust, AJumpBetweenTwoInputsLeavesItsImpulseUncertain) {
   RotorThrust thrust{vehicle(), InputSource::kCommand};
   thrust.on_commands(at(0), std::array{0.0, 0.5, 0.5});
   thrust.on_commands(at(0.02), std::array{0.5, 0.5, 0.5});
-  const auto missed = thrust.take_missed_m_s();
+  const RotorThrust::Missed all = thrust.take_missed();
+  EXPECT_NEAR(all.period_s, 0.02, 1e-9);
+  const auto& missed = all.impulse_m_s;
   EXPECT_NEAR(missed[0], 0.5 * 0.02 * 1e-5 / 2.0 * (500.0 * 500 - 100 * 100), 1e-12);
   EXPECT_EQ(missed[1], 0.0);
-  EXPECT_EQ(thrust.take_missed_m_s()[0], 0.0);
+  EXPECT_EQ(thrust.take_missed().impulse_m_s[0], 0.0);
 }
 
 }  // namespace
