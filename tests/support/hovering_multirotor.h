@@ -9,7 +9,8 @@
 
 namespace airworthy::test {
 
-/// A rigid multirotor of flat arms that hovers level: a rate controller, rotors with lag, and nothing else. Its physics
+/// A rigid multirotor of flat arms that hovers level: a rate controller, rotors with lag and, if the vehicle is given any,
+/// inertia, and nothing else. Its physics
 /// are written out again here, apart from what is tested. Even numbers of rotors, alternately turning.
 class HoveringMultirotor {
  public:
@@ -39,10 +40,13 @@ class HoveringMultirotor {
       // Commands: stay level, with some play about all axes.
       const auto& r = vehicle.rotor[i].position_m;
       const double play = excitation * (std::sin(2.1 * time_s) * r[1] + std::sin(2.7 * time_s + 1) * r[0]);
-      const double wanted = 1.0 + play + 0.15 * (rates_rad_s[0] * r[1] - rates_rad_s[1] * r[0]) / 0.2;
+      const double yaw_play = yaw_excitation * vehicle.rotor[i].spin * std::sin(3.3 * time_s);
+      const double wanted =
+          1.0 + play + yaw_play + 0.15 * (rates_rad_s[0] * r[1] - rates_rad_s[1] * r[0]) / 0.2;
       const double target = hover_rad_s_ * std::sqrt(std::max(0.1, wanted));
       command_ratio[i] =
           (target - vehicle.speed_min_rad_s) / (vehicle.speed_max_rad_s - vehicle.speed_min_rad_s);
+      const double before_rad_s = speed_rad_s[i];
       speed_rad_s[i] += (1 - std::exp(-kStep_s / vehicle.motor_time_constant_s)) * (target - speed_rad_s[i]);
       const double thrust =
           vehicle.thrust_coefficient_N_s2 * speed_rad_s[i] * speed_rad_s[i] * (1.0 - loss_ratio[i]);
@@ -50,6 +54,8 @@ class HoveringMultirotor {
       moment_N_m[0] -= r[1] * thrust;
       moment_N_m[1] += r[0] * thrust;
       moment_N_m[2] -= vehicle.rotor[i].spin * vehicle.torque_ratio_m * thrust;
+      moment_N_m[2] -=
+          vehicle.rotor[i].spin * vehicle.propeller_inertia_kg_m2 * (speed_rad_s[i] - before_rad_s) / kStep_s;
     }
     const auto& I = vehicle.inertia_kg_m2;
     const auto w = rates_rad_s;
@@ -64,6 +70,7 @@ class HoveringMultirotor {
   Multirotor vehicle;
   std::array<double, kMaxRotors> loss_ratio{};
   double excitation = 1.0;
+  double yaw_excitation = 0.0;  ///< share of a rotor's thrust
   double time_s = 0;
   std::array<double, kMaxRotors> speed_rad_s{};
   std::array<double, kMaxRotors> command_ratio{};

@@ -121,6 +121,84 @@ TEST(ActuatorMonitor, OfAQuadrotorEveryLossIsEstimated) {
   }
 }
 
+// What the rotors do about yaw by spinning up is as much as by their drag here.
+TEST(ActuatorMonitor, TheTorqueOfRotorsThatSpinUpIsNoDisturbance) {
+  HoveringMultirotor body{4, 5};
+  body.vehicle.propeller_inertia_kg_m2 = 2e-4;
+  body.yaw_excitation = 0.15;
+  ActuatorMonitor monitor{Flight::params(body.vehicle, InputSource::kCommand)};
+  double most_rad_s2 = 0.0;
+  for (int i = 0; i < 10'000; ++i) {
+    body.step();
+    const TimePoint now = TimePoint{} + from_seconds(body.time_s);
+    monitor.on_rotor_commands(now, std::span{body.command_ratio}.first(4));
+    (void)monitor.on_imu({now, body.accel_m_s2, body.gyro_rad_s}, Phase::kInFlight);
+    // The damping of the body is one, and comes late.
+    const double damping_rad_s2 = -0.05 / 0.035 * body.rates_rad_s[2];
+    if (i < 5000) continue;
+    most_rad_s2 = std::max(most_rad_s2, std::abs(monitor.axis_states()[kYaw].disturbance - damping_rad_s2));
+  }
+  EXPECT_LT(most_rad_s2, 2.0);  // 3.6 if the torque were left out
+}
+
+TEST(ActuatorMonitor, WhatFailsWithinTwoSecondsIsAConsequence) {
+  Flight flight{4, 3};
+  flight.fly(40);
+  flight.body.loss_ratio[0] = 0.5;
+  flight.fly(0.5);
+  ASSERT_EQ(flight.named, 0U);
+  const double first_s = flight.raised_s;
+  flight.body.loss_ratio[1] = 0.5;
+  while (flight.body.time_s < first_s + 1.99) {
+    flight.fly(HoveringMultirotor::kStep_s);
+    ASSERT_EQ(flight.raised + flight.axis_raised, 1) << flight.body.time_s - first_s;
+  }
+  flight.named.reset();
+  flight.fly(2);
+  EXPECT_EQ(flight.named, 1U);
+  EXPECT_EQ(flight.raised, 2);
+}
+
+// σ ≥ 1.5·√q, and q falls from first_spread² with a time constant of 10 s while nothing deviates.
+TEST(ActuatorMonitor, ALossMustExceedTheSpreadOfTheFlight) {
+  Flight flight{4, 3};
+  for (const double seconds : {4.0, 10.0, 20.0}) {
+    flight.fly(seconds - flight.body.time_s);
+    for (const LossVerdict& rotor : flight.monitor.rotors()) {
+      EXPECT_NEAR(rotor.test_sigma, 1.5 * 0.2 * std::exp(-seconds / 20.0), 0.03) << seconds;
+    }
+  }
+  // The same loss is a fault where the flight has been calm, and none where it still may be the wind.
+  for (const double flown_s : {4.0, 60.0}) {
+    Flight young{4, 3};
+    young.fly(flown_s);
+    young.body.loss_ratio[1] = 0.4;
+    young.fly(2);
+    EXPECT_EQ(young.raised, flown_s > 30.0 ? 1 : 0) << flown_s;
+  }
+}
+
+// A command that jumps may have done so at any time since the one before.
+TEST(ActuatorMonitor, AJumpOfTheCommandsLeavesTheRatesUncertain) {
+  Flight flight{4, 3};
+  flight.body.excitation = 0.0;
+  flight.command_every = 10;
+  flight.fly(20);
+  ActuatorMonitor calm = flight.monitor;
+  flight.body.step();
+  const MonitorSample sample{flight.now(), flight.body.accel_m_s2, flight.body.gyro_rad_s};
+  std::array<double, 4> commands{};
+  std::copy_n(flight.body.command_ratio.begin(), 4, commands.begin());
+  calm.on_rotor_commands(sample.time, commands);
+  commands[0] += 0.2;
+  flight.monitor.on_rotor_commands(sample.time, commands);
+  (void)calm.on_imu(sample, Phase::kInFlight);
+  (void)flight.monitor.on_imu(sample, Phase::kInFlight);
+  for (const Axis axis : {kRoll, kPitch}) {
+    EXPECT_GT(flight.monitor.axis_states()[axis].rate_sigma, 1.15 * calm.axis_states()[axis].rate_sigma);
+  }
+}
+
 TEST(ActuatorMonitor, AMotorThatDoesNotFollowIsALossThoughItsSpeedIsKnown) {
   Flight flight{4, 3, InputSource::kAuto};
   flight.fly(30);
