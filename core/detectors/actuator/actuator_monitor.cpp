@@ -11,9 +11,9 @@ namespace {
 
 constexpr double kGravity_m_s2 = 9.81;
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
-constexpr double kLongestStep_s = 0.1;  // a longer gap starts the flight's estimates anew
-constexpr Duration kLongestRepeat{100'000};
-constexpr double kMostRate_rad_s = 200.0;  // no gyro and no accelerometer gives more
+constexpr double kLongestStep_s = 0.1;      // a longer gap starts the flight's estimates anew
+constexpr Duration kLongestRepeat{50'000};  // then the autopilot may have been misled as well
+constexpr double kMostRate_rad_s = 200.0;   // no gyro and no accelerometer gives more
 constexpr double kMostAccel_m_s2 = 2000.0;
 constexpr double kRawAccelFactor = 4.0;  // noise before the low-pass over that after it
 constexpr double kForceReach = 2.0;      // of weight and thrust: a thrust may come and go within one sample

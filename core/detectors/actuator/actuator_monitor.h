@@ -122,7 +122,7 @@ struct MonitorSample {
 /// first, then over a minute, and not while anything is suspected. A loss that all rotors share is therefore not seen.
 /// What γ beyond [−1, 2] would explain is no loss: it is not raised, and the bound is published with the reason.
 /// A sample that SampleCheck does not take is no measurement: the observers go on by their models alone. What repeats for
-/// longer than 0.1 s mutes, and the flight's estimates start anew after it.
+/// longer than 0.05 s mutes, and the flight's estimates start anew after it.
 /// Axes are judged by prompt input only, for a command that acts late looks like one without effect.
 /// In a phase other than flight nothing is estimated, and each flight starts anew. Once the vehicle has stood on the ground
 /// for 3 s it may have been repaired: baselines, thrust per command and latched rotors are forgotten, and what is found in
