@@ -7,7 +7,7 @@ from evidence_page import ROOT, Failed, build, circumstances, page, run
 PROGRAMS = ROOT / "build/dev/bin"
 LOST = ("lost", 0, 1200)
 LOSSES = ("0.1", "0.2", "0.3", "0.4", "0.6")
-PARTIAL_FLIGHTS = 80
+PARTIAL_FLIGHTS = 400
 EXCESSES = ("0.2", "0.3", "0.5")
 EXCESS_FLIGHTS = 48
 MOUNTED, SUDDEN = ("0", "120"), ("10", "1")  # onset and how long it is waited for, s

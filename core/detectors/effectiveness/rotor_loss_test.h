@@ -38,6 +38,8 @@ struct RotorLossParams {
   Scalar unexplained = 8;                  ///< what one rotor may leave unexplained, nats ...
   Scalar unexplained_ratio = Scalar(0.2);  ///< ... or as a share of all that is to be explained
   Scalar fruitless_s = Scalar(0.5);        ///< a sum that has so little to say after so long starts anew
+  Scalar gain_odds = -10;                  ///< π of a gain, nats: no propeller grows in flight
+  Scalar return_odds = 8;  ///< π of what was lost and comes back: likelier than a loss of another rotor
   Scalar varying_ratio = Scalar(0.5);  ///< of the evidence may come from changes of the rotor's speed alone
 };
 
@@ -60,8 +62,7 @@ template <class Scalar>
 ///                 a sum that goes on would be blind to what begins now                                      (3)
 ///   Something else  any acceleration of p, q and a_z at once since t₀:  ℓ₀ = Σ_axes a²/(2b)                     (4)
 ///   Decision      ℓᵢ ≥ h, (ℓᵢ + πᵢ) − (ℓⱼ + πⱼ) ≥ margin for every other rotor j, and ℓ₀ − ℓᵢ within what is allowed.
-///                 π is −margin for a gain, for no propeller grows in flight; +margin for what was lost and comes
-///                 back, which is likelier than that another rotor loses something; 0 for a loss             (5)
+///                 π is the log of the odds before any evidence: of a loss 0, of a gain and of a return as given  (5)
 ///   Lasting       ℓ₀ − ℓᵢ ≥ −ℓᵢ/2: a loss is a lasting change, not the rotor's own ups and downs           (6)
 ///   Source        [Page1954], [Willsky1976]; derived in docs/equations/effectiveness.md
 ///   Deviations    t₀ by (3) instead of a search over all t₀: one sum for each rotor and range
@@ -163,10 +164,10 @@ class RotorLossTest {
     Scalar everything = 0;  ///< ℓ₀
   };
 
-  /// Log of the odds before any evidence, against a first loss: a return is likelier, a gain less likely.
+  /// π
   [[nodiscard]] Scalar prior_odds(std::size_t range, std::size_t rotor) const noexcept {
     if (ranges_[range].most > Scalar{0}) return Scalar{0};
-    return -windows_[range][rotor].loss < most_return_[rotor] ? params_.margin : -params_.margin;
+    return -windows_[range][rotor].loss < most_return_[rotor] ? params_.return_odds : params_.gain_odds;
   }
 
   static void read_size(const Window& window, Finding& finding) noexcept {
