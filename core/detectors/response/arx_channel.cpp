@@ -63,7 +63,7 @@ ChannelVerdict ArxChannel::step(TimePoint now, Duration flown, bool muted) noexc
   verdict.observed = judged_.observed;
   verdict.expected = judged_.expected;
   verdict.sigma = judged_.sigma;
-  verdict.onset = onset_;
+  verdict.onset = magnitude_.onset();
   const bool fresh = judged_since_tick_;
   judged_since_tick_ = false;
   if (!sampled_ || now - last_sample_ > params_.longest_gap) {
@@ -74,17 +74,9 @@ ChannelVerdict ArxChannel::step(TimePoint now, Duration flown, bool muted) noexc
   verdict.reason = NotJudged::kJudged;
   verdict.test_ratio = judged_.test_ratio;
   verdict.transition = life_cycle_.step(verdict.test_ratio, now);
-  if (verdict.transition == Transition::kRaise) {
-    onset_ = judged_.time;
-    innovation_sum_ = variance_sum_ = 0;
-    innovation_count_ = 0;
-  }
-  if (life_cycle_.active() && fresh) {
-    innovation_sum_ += verdict.observed - verdict.expected;
-    variance_sum_ += verdict.sigma * verdict.sigma;
-    ++innovation_count_;
-  }
-  tell_magnitude(verdict);
+  if (verdict.transition == Transition::kRaise) magnitude_.begin(judged_.time);
+  if (life_cycle_.active() && fresh) magnitude_.add(verdict);
+  magnitude_.tell(verdict);
   return verdict;
 }
 
@@ -93,16 +85,8 @@ ChannelVerdict ArxChannel::pause(TimePoint now) noexcept {
   ChannelVerdict verdict;
   verdict.reason = NotJudged::kPaused;
   if (life_cycle_.active()) verdict.transition = life_cycle_.step(1.0, now);
-  tell_magnitude(verdict);
+  magnitude_.tell(verdict);
   return verdict;
-}
-
-void ArxChannel::tell_magnitude(ChannelVerdict& verdict) const noexcept {
-  verdict.onset = onset_;
-  if (innovation_count_ == 0) return;
-  const auto count = static_cast<double>(innovation_count_);
-  verdict.mean_innovation = innovation_sum_ / count;
-  verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
 }
 
 }  // namespace airworthy::response

@@ -4,6 +4,7 @@
 
 #include "core/detectors/fault_life_cycle.h"
 #include "core/detectors/response/channel_verdict.h"
+#include "core/detectors/response/fault_magnitude.h"
 #include "core/detectors/response/signals.h"
 #include "core/estimators/factorised_rls.h"
 #include "core/estimators/running_moments.h"
@@ -85,7 +86,6 @@ class ArxChannel {
     double test_ratio = 0;
   };
 
-  void tell_magnitude(ChannelVerdict& verdict) const noexcept;
   void judge(TimePoint time, double output, const Rls::Innovation& innovation) noexcept;
   void remember(double input, double output) noexcept;
 
@@ -104,10 +104,7 @@ class ArxChannel {
   bool armed_ = false;
   Judged judged_;  ///< the newest sample, or a worse one since the last tick
   bool judged_since_tick_ = false;
-  TimePoint onset_;
-  double innovation_sum_ = 0;
-  double variance_sum_ = 0;
-  std::int64_t innovation_count_ = 0;
+  FaultMagnitude magnitude_;
 };
 
 }  // namespace airworthy::response

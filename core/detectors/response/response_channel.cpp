@@ -53,18 +53,14 @@ ChannelVerdict ResponseChannel::step(const SignalFrame& frame, double tick_s, Ti
   const Cusum& worse = low_.test_ratio() >= high_.test_ratio() ? low_ : high_;
   verdict.test_ratio = worse.test_ratio();
   verdict.transition = life_cycle_.step(verdict.test_ratio, now);
-  if (verdict.transition == Transition::kRaise) {
-    onset_ = worse.onset();
-    innovation_sum_ = variance_sum_ = 0;
-    innovation_count_ = 0;
-  }
-  if (life_cycle_.active()) track_magnitude(verdict);
+  if (verdict.transition == Transition::kRaise) magnitude_.begin(worse.onset());
+  if (life_cycle_.active()) magnitude_.add(verdict);
   if (verdict.transition == Transition::kClear) {
     low_.reset();
     high_.reset();
     regression_.drop_unlearned();
   }
-  tell_magnitude(verdict);
+  magnitude_.tell(verdict);
   return verdict;
 }
 
@@ -85,7 +81,7 @@ ChannelVerdict ResponseChannel::pause(const SignalFrame& frame, double tick_s, T
     low_.reset();
     high_.reset();
   }
-  tell_magnitude(verdict);
+  magnitude_.tell(verdict);
   return verdict;
 }
 
@@ -121,20 +117,6 @@ void ResponseChannel::accumulate(const ChannelVerdict& verdict, TimePoint now) n
   const double z = innovation / verdict.sigma;
   if (params_.side != Side::kHigh) low_.step(shift_evidence(params_.evidence, -z), now);
   if (params_.side != Side::kLow) high_.step(shift_evidence(params_.evidence, z), now);
-}
-
-void ResponseChannel::track_magnitude(const ChannelVerdict& verdict) noexcept {
-  innovation_sum_ += verdict.observed - verdict.expected;
-  variance_sum_ += verdict.sigma * verdict.sigma;
-  ++innovation_count_;
-}
-
-void ResponseChannel::tell_magnitude(ChannelVerdict& verdict) const noexcept {
-  verdict.onset = onset_;
-  if (innovation_count_ == 0) return;
-  const auto count = static_cast<double>(innovation_count_);
-  verdict.mean_innovation = innovation_sum_ / count;
-  verdict.mean_innovation_sigma = std::sqrt(variance_sum_) / count;
 }
 
 }  // namespace airworthy::response

@@ -7,6 +7,7 @@
 #include "core/detectors/response/channel_prior.h"
 #include "core/detectors/response/channel_verdict.h"
 #include "core/detectors/response/evidence.h"
+#include "core/detectors/response/fault_magnitude.h"
 #include "core/detectors/response/regressor.h"
 #include "core/estimators/delayed_regression.h"
 
@@ -70,9 +71,7 @@ class ResponseChannel {
 
   /// Steps all delays. x of the newest tick, with 0 for terms that count only after a warm start.
   [[nodiscard]] Regression::Vector read(const SignalFrame& frame, double tick_s, double& observed) noexcept;
-  void tell_magnitude(ChannelVerdict& verdict) const noexcept;
   void accumulate(const ChannelVerdict& verdict, TimePoint now) noexcept;
-  void track_magnitude(const ChannelVerdict& verdict) noexcept;
 
   ChannelParams params_;
   Regressor response_;
@@ -83,10 +82,7 @@ class ResponseChannel {
   Cusum low_;   ///< evidence of a downward shift, or of a lost gain
   Cusum high_;  ///< evidence of an upward shift
   FaultLifeCycle life_cycle_;
-  TimePoint onset_;
-  double innovation_sum_ = 0;
-  double variance_sum_ = 0;
-  std::int64_t innovation_count_ = 0;
+  FaultMagnitude magnitude_;
 };
 
 }  // namespace airworthy::response
