@@ -25,9 +25,7 @@ std::string reason_of(NotJudged reason, double sigma) {
     case NotJudged::kNoInput:
       return "inertial data, or rotor speeds and commands, missing";
     case NotJudged::kInputTooSlow:
-      return "rotor speeds or commands come too seldom or too late: axes need commands every 30 ms or speeds "
-             "every "
-             "15 ms, rotors a quarter of that rate";
+      return "rotor speeds or commands come too seldom or too late";
     case NotJudged::kNotFlying:
       return "not in free flight";
     case NotJudged::kFrozen:
