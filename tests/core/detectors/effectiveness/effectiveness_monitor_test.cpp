@@ -54,12 +54,18 @@ class Hover : public test::HoveringQuad {
   void fly(double seconds) {
     for (double t = 0.0; t < seconds && !event; t += step_s) {
       time_s_ += step_s;
-      std::array<double, 4> speed{};
-      step(step_s, [&](std::size_t i, double speed_rad_s) { speed[i] = speed_rad_s + noise(0.5); });
-      tell_speeds(speed);
+      tell_speeds(step_body());
       if (event) return;
       measure();
       event = monitor.on_imu(now() + inertial_late, accel_m_s2_, gyro_rad_s_, phase);
+    }
+  }
+
+  /// The body moves on, and no inertial sample arrives.
+  void fly_unmeasured(double seconds) {
+    for (double t = 0.0; t < seconds && !event; t += step_s) {
+      time_s_ += step_s;
+      tell_speeds(step_body());
     }
   }
 
@@ -70,6 +76,13 @@ class Hover : public test::HoveringQuad {
     TimePoint stamp;
     std::array<double, 4> speed_rad_s;
   };
+
+  /// One step; the speeds as measured.
+  std::array<double, 4> step_body() {
+    std::array<double, 4> speed{};
+    step(step_s, [&](std::size_t i, double speed_rad_s) { speed[i] = speed_rad_s + noise(0.5); });
+    return speed;
+  }
 
   void tell_speeds(const std::array<double, 4>& speed_rad_s) {
     if (sends_commands) {
@@ -282,6 +295,45 @@ TEST(EffectivenessMonitor, IsMutedWithAReason) {
   slow.step_s = 0.025;
   slow.fly(5.0);
   EXPECT_EQ(slow.monitor.muted(), Muted::kTooSlow);
+}
+
+// Leaving the ground, thrust and drag change as if a little were lost; a great loss cannot wait.
+TEST(EffectivenessMonitor, SoonAfterTakeOffOnlyGreatLossesCount) {
+  for (const double left : {0.7, 0.0}) {
+    Hover hover;
+    hover.fly(1.0);
+    hover.effectiveness[1] = left;
+    hover.fly(1.0);
+    EXPECT_EQ(hover.event.has_value(), left == 0.0);
+  }
+}
+
+TEST(EffectivenessMonitor, WhatIsOverWithinTwoSamplesIsNoLoss) {
+  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
+    Hover hover;
+    hover.fly(5.0);
+    hover.effectiveness[rotor] = 0.0;
+    hover.fly(2.0 * kStep_s);
+    hover.effectiveness[rotor] = 1.0;
+    hover.fly(1.0);
+    EXPECT_FALSE(hover.event) << rotor;
+  }
+}
+
+// What the body did meanwhile is unknown.
+TEST(EffectivenessMonitor, AfterAGapTheMotionStartsAnew) {
+  Hover hover;
+  hover.wander_ratio = 0.1;
+  hover.fly(5.0);
+  for (int gap = 0; gap < 100 && !hover.event; ++gap) {
+    hover.fly_unmeasured(0.3);
+    hover.fly(0.5);
+  }
+  EXPECT_FALSE(hover.event);
+  hover.effectiveness[1] = 0.0;
+  hover.fly(0.2);
+  ASSERT_TRUE(hover.event);
+  EXPECT_EQ(hover.event->rotor, 1U);
 }
 
 // The body turns faster within a step than it is measured: what counts is that the model follows.
