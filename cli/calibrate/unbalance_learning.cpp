@@ -27,6 +27,7 @@ constexpr Duration kBeforeOnset{500'000};
 constexpr double kSigmas = 2.0;  // that the detector asks for
 constexpr double kLeastSpeedNoise = 0.001;
 constexpr double kMostSpeedNoise = 0.05;
+constexpr double kMostResponse = 10.0;  // of a rigid body's, or its inverse: a wrong figure, no airframe
 
 /// What the monitor said of one rotor, judgement by judgement.
 struct RotorRecord {
@@ -360,7 +361,14 @@ rt::Expected<void> learn_response(const std::vector<TrialFlight>& trials, const 
     const double moment_kg_m = 1e-6 * tip_mass_mg * config.monitor.vehicle.propeller_radius_m;
     measured.push_back(
         response_of(rotor, moment_kg_m, amplitudes, calibration.rotors[rotor].baseline_m_s2, config.monitor));
-    responses.push_back(measured.back().response);
+    const double ratio = measured.back().response;
+    if (ratio > 0.0 && (ratio > kMostResponse || ratio < 1.0 / kMostResponse)) {
+      return rt::fail_with(
+          fmt::format("rotor {}: {:g} mg made {:.2g} times the vibration that follows from the vehicle file: "
+                      "are the milligrams right, and its mass and propeller radius?",
+                      number, tip_mass_mg, ratio));
+    }
+    responses.push_back(ratio);
     if (amplitudes.size() == 1) {
       learned.notes.push_back(fmt::format(
           "rotor {}: one trial only; fly again with the mass on the other blade: its phase against the "

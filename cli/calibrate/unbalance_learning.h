@@ -41,7 +41,8 @@ inline constexpr double kLeastJudged_s = 20.0;
 ///              mass once on either blade its square is ½(a₁² + a₂²) − b², whatever the phase of the baseline b; of one
 ///              trial it is a² − b² on average over that phase. Sigma of each rotor: of the trial's amplitudes (for one
 ///              trial b/√2 as well), and of carrying it from the rotor of the trial to this one                    (4)
-/// Refuses logs of other vehicles, too little judged flight, and rotors that were never judged, with the reason.
+/// Refuses logs of other vehicles, too little judged flight, rotors that were never judged, and trials that made ten times
+/// what (4) expects of a rigid body, or a tenth, with the reason.
 [[nodiscard]] rt::Expected<LearnedUnbalance> learn_unbalance(const std::vector<std::string>& logs,
                                                              const std::vector<TrialFlight>& trials,
                                                              const unbalance::UnbalanceConfig& config,

@@ -143,6 +143,10 @@ TEST_F(UnbalanceLearningTest, RefusesWhatTeachesNothing) {
               HasSubstr("foreign.lcm: of vehicle \"other\", not of \"medium\""));
   EXPECT_THAT(error_of({log("absent")}, {}), HasSubstr("absent.lcm"));
   EXPECT_THAT(error_of({log("healthy")}, {{log("short"), 3, kTrial_mg}}), HasSubstr("could not be judged"));
+  EXPECT_THAT(error_of({log("healthy")}, {{log("trial"), 3, 1e3 * kTrial_mg}}),
+              HasSubstr("rotor 3: 200000 mg made 0.0"));
+  EXPECT_THAT(error_of({log("healthy")}, {{log("trial"), 3, 1e-3 * kTrial_mg}}),
+              HasSubstr("rotor 3: 0.2 mg made "));
 }
 
 }  // namespace
