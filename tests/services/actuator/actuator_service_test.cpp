@@ -8,8 +8,7 @@
 #include <numbers>
 
 #include "runtime/bus/channels.h"
-#include "runtime/bus/lcm_bus.h"
-#include "runtime/clock/manual_clock.h"
+#include "tests/support/detector_bench.h"
 #include "tests/support/hovering_multirotor.h"
 
 namespace airworthy::actuator {
@@ -26,16 +25,13 @@ ActuatorConfig config_of(const Multirotor& vehicle, double isolation_log_likelih
 }
 
 /// A driver on an in-process bus, and the service.
-class ActuatorServiceTest : public ::testing::Test {
+class ActuatorServiceTest : public ::testing::Test, protected test::DetectorBench {
  protected:
   explicit ActuatorServiceTest(double isolation_log_likelihood = 5.0)
-      : config_{config_of(body_.vehicle, isolation_log_likelihood)} {
+      : DetectorBench{"v1", "airworthy-actuator", kStart},
+        config_{config_of(body_.vehicle, isolation_log_likelihood)} {
     body_.vehicle.gear_height_m = 0.1;
     body_.vehicle.gear_radius_m = 0.1;
-    observer_.subscribe<fault_event_t>(channel::kFaultEvent,
-                                       [this](const fault_event_t& event) { events_.push_back(event); });
-    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
-                                           [this](const detector_status_t& status) { status_ = status; });
     observer_.subscribe<actuator_state_t>(channel::kActuatorState, [this](const actuator_state_t& state) {
       state_ = state;
       ++states_;
@@ -86,11 +82,6 @@ class ActuatorServiceTest : public ::testing::Test {
     ticks_.publish(tick, now);
   }
 
-  void deliver() {
-    while (*bus_->dispatch(100) > 0) {
-    }
-  }
-
   const component_assessment_t& assessment(const std::string& component) {
     const auto found = std::find_if(status_.components.begin(), status_.components.end(),
                                     [&](const auto& one) { return one.component == component; });
@@ -102,9 +93,6 @@ class ActuatorServiceTest : public ::testing::Test {
 
   test::HoveringMultirotor body_{4, 11};
   double took_off_s_ = 0;
-  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
-  rt::ManualClock clock_{kStart};
-  rt::Log log_{"test", rt::LogLevel::kError};
   rt::Node driver_{*bus_, clock_, log_, {"v1", "driver", 3}};
   rt::Publisher<imu_t> imus_{driver_.advertise(channel::kImu)};
   rt::Publisher<rotor_command_t> commands_{driver_.advertise(channel::kRotorCommand)};
@@ -112,12 +100,8 @@ class ActuatorServiceTest : public ::testing::Test {
   rt::Publisher<attitude_t> attitudes_{driver_.advertise(channel::kAttitude)};
   rt::Publisher<flight_state_t> flight_states_{driver_.advertise(channel::kFlightState)};
   rt::Publisher<tick_t> ticks_{driver_.advertise(channel::kTick)};
-  rt::Node observer_{*bus_, clock_, log_, {"v1", "observer", 4}};
-  rt::Node node_{*bus_, clock_, log_, {"v1", "airworthy-actuator", 5}};
   ActuatorConfig config_;
   ActuatorService service_{node_, config_};
-  std::vector<fault_event_t> events_;
-  detector_status_t status_;
   actuator_state_t state_;
   int states_ = 0;
 };
