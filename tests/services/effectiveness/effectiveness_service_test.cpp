@@ -6,12 +6,8 @@
 #include <map>
 #include <vector>
 
-#include "airworthy/tick_t.hpp"
 #include "runtime/bus/channels.h"
-#include "runtime/bus/lcm_bus.h"
-#include "runtime/clock/manual_clock.h"
-#include "sim/output/log_output.h"
-#include "sim/simulation.h"
+#include "tests/support/flown_service.h"
 
 namespace airworthy::effectiveness {
 namespace {
@@ -27,21 +23,18 @@ EffectivenessConfig quad_config() {
   return *config;
 }
 
-/// A simulated quadrotor on an in-process bus, and the service listening.
-class EffectivenessServiceTest : public ::testing::Test {
+/// A simulated quadrotor and its service.
+class EffectivenessServiceTest : public ::testing::Test,
+                                 protected test::FlownService<EffectivenessService, EffectivenessConfig> {
  protected:
   EffectivenessServiceTest() : EffectivenessServiceTest{quad_config(), plan()} {}
 
   /// What flies is as the shipped configuration describes it, whatever `config` says.
   EffectivenessServiceTest(EffectivenessConfig config, const sim::Scenario& scenario)
-      : config_{std::move(config)},
-        simulation_{quad_config().monitor.vehicle, scenario, sim::Realism::at(sim::Level::kHard), 3} {
-    observer_.subscribe<fault_event_t>(channel::kFaultEvent, [this](const fault_event_t& event) {
-      events_.push_back(event);
-      told_at_.push_back(clock_.now());
-    });
-    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
-                                           [this](const detector_status_t& status) { status_ = status; });
+      : FlownService{"airworthy-effectiveness", std::move(config), quad_config().monitor.vehicle, scenario,
+                     3} {
+    observer_.subscribe<fault_event_t>(channel::kFaultEvent,
+                                       [this](const fault_event_t&) { told_at_.push_back(clock_.now()); });
   }
 
   static sim::Scenario plan() {
@@ -60,27 +53,7 @@ class EffectivenessServiceTest : public ::testing::Test {
     return scenario;
   }
 
-  void fly_until(double time_s) {
-    while (simulation_.time_s() < time_s) {
-      simulation_.step(output_);
-      while (*bus_->dispatch(100) > 0) {
-      }
-      clock_.advance_to(clock_.now() + Duration{2'000});
-    }
-  }
-
-  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
-  rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
-  rt::Log log_{"test", rt::LogLevel::kError};
-  EffectivenessConfig config_;
-  sim::LogOutput output_{*bus_, config_.vehicle, 4, 1};
-  sim::Simulation simulation_;
-  rt::Node observer_{*bus_, clock_, log_, {config_.vehicle, "observer", 4}};
-  rt::Node node_{*bus_, clock_, log_, {config_.vehicle, "airworthy-effectiveness", 5}};
-  EffectivenessService service_{node_, config_};
-  std::vector<fault_event_t> events_;
-  std::vector<TimePoint> told_at_;
-  detector_status_t status_;
+  std::vector<TimePoint> told_at_;  ///< each of events_
 };
 
 TEST_F(EffectivenessServiceTest, NamesTheRotorThatLostItsPropeller) {
@@ -240,15 +213,7 @@ TEST_F(ExcessThatComesAndGoes, IsRaisedAndClearedByNumber) {
 
 TEST_F(EffectivenessServiceTest, SilenceOfTheInertialUnitIsNotHealth) {
   fly_until(10.0);
-  rt::Node gateway{*bus_, clock_, log_, {config_.vehicle, "airworthy-gateway", 9}};
-  auto ticks = gateway.advertise(channel::kTick);
-  for (int i = 0; i < 40; ++i) {
-    clock_.advance_to(clock_.now() + Duration{50'000});
-    tick_t tick{};
-    ticks.publish(tick, sim::LogOutput::vehicle_time(10.0 + 0.05 * i));
-    while (*bus_->dispatch(100) > 0) {
-    }
-  }
+  fall_silent();
   EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMuted));
   EXPECT_EQ(status_.muted_reason, "inertial data stale");
 }

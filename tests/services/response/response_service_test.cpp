@@ -9,10 +9,7 @@
 #include <random>
 
 #include "runtime/bus/channels.h"
-#include "runtime/bus/lcm_bus.h"
-#include "runtime/clock/manual_clock.h"
-#include "sim/output/log_output.h"
-#include "sim/simulation.h"
+#include "tests/support/flown_service.h"
 
 namespace airworthy::response {
 namespace {
@@ -42,14 +39,9 @@ ResponseConfig thrust_config() {
 }
 
 /// A driver and a gateway's clock on an in-process bus, and the service between them.
-class ResponseServiceTest : public ::testing::Test {
+class ResponseServiceTest : public ::testing::Test, protected test::DetectorBench {
  protected:
-  ResponseServiceTest() {
-    observer_.subscribe<fault_event_t>(channel::kFaultEvent,
-                                       [this](const fault_event_t& event) { events_.push_back(event); });
-    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
-                                           [this](const detector_status_t& status) { status_ = status; });
-  }
+  ResponseServiceTest() : DetectorBench{"v1", "airworthy-response", kStart} {}
 
   void fly(double from_s, double to_s, double lost_accel_m_s2 = 0.0) {
     for (int i = static_cast<int>(from_s * 10); i < static_cast<int>(to_s * 10); ++i) {
@@ -69,11 +61,6 @@ class ResponseServiceTest : public ::testing::Test {
     }
   }
 
-  void deliver() {
-    while (*bus_->dispatch(100) > 0) {
-    }
-  }
-
   // Lets the service see everything, then waits for its next status.
   void settle() {
     deliver();
@@ -90,19 +77,12 @@ class ResponseServiceTest : public ::testing::Test {
 
   static constexpr TimePoint kStart = from_us(50'000'000);
 
-  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
-  rt::ManualClock clock_{kStart};
-  rt::Log log_{"test", rt::LogLevel::kError};
   rt::Node driver_{*bus_, clock_, log_, {"v1", "driver", 3}};
   rt::Publisher<imu_t> imus_{driver_.advertise(channel::kImu)};
   rt::Publisher<attitude_t> attitudes_{driver_.advertise(channel::kAttitude)};
   rt::Publisher<tick_t> ticks_{driver_.advertise(channel::kTick)};
-  rt::Node observer_{*bus_, clock_, log_, {"v1", "observer", 4}};
-  rt::Node node_{*bus_, clock_, log_, {"v1", "airworthy-response", 5}};
   ResponseConfig config_ = thrust_config();
   ResponseService service_{node_, config_};
-  std::vector<fault_event_t> events_;
-  detector_status_t status_;
   std::mt19937 random_{3};
   std::normal_distribution<double> normal_;
 };
@@ -217,15 +197,12 @@ TEST_F(ResponseServiceTest, TheOtherInertialUnitIsNotListenedTo) {
   EXPECT_EQ(status_.components[0].evidence[0].value, before);
 }
 
-/// A simulated quadrotor that takes off and lands every twenty seconds, on an in-process bus.
-class ResponseServiceLandings : public ::testing::TestWithParam<std::uint64_t> {
+/// A simulated quadrotor that takes off and lands every twenty seconds.
+class ResponseServiceLandings : public ::testing::TestWithParam<std::uint64_t>,
+                                protected test::FlownService<ResponseService, ResponseConfig> {
  protected:
-  ResponseServiceLandings() {
-    observer_.subscribe<fault_event_t>(channel::kFaultEvent,
-                                       [this](const fault_event_t& event) { events_.push_back(event); });
-    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
-                                           [this](const detector_status_t& status) { status_ = status; });
-  }
+  ResponseServiceLandings()
+      : FlownService{"airworthy-response", f450(), *f450().multirotor, landings(), GetParam()} {}
 
   static ResponseConfig f450() {
     auto config = ResponseConfig::load(AIRWORTHY_CONFIG "/response_multirotor.toml",
@@ -239,28 +216,6 @@ class ResponseServiceLandings : public ::testing::TestWithParam<std::uint64_t> {
     EXPECT_TRUE(scenario.has_value()) << (scenario ? "" : scenario.error().text);
     return *scenario;
   }
-
-  void fly_until(double time_s) {
-    while (simulation_.time_s() < time_s) {
-      simulation_.step(output_);
-      while (*bus_->dispatch(100) > 0) {
-      }
-      clock_.advance_to(clock_.now() + Duration{2'000});
-    }
-  }
-
-  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
-  rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
-  rt::Log log_{"test", rt::LogLevel::kError};
-  ResponseConfig config_ = f450();
-  sim::LogOutput output_{*bus_, config_.vehicle, 4, 1};
-  sim::Simulation simulation_{*config_.multirotor, landings(), sim::Realism::at(sim::Level::kHard),
-                              GetParam()};
-  rt::Node observer_{*bus_, clock_, log_, {config_.vehicle, "observer", 4}};
-  rt::Node node_{*bus_, clock_, log_, {config_.vehicle, "airworthy-response", 5}};
-  ResponseService service_{node_, config_};
-  std::vector<fault_event_t> events_;
-  detector_status_t status_;
 };
 
 // By the attitude errors alone every one of these flights has an alarm when the ground takes the vehicle over.

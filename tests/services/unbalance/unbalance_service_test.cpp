@@ -3,12 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "airworthy/tick_t.hpp"
-#include "runtime/bus/channels.h"
-#include "runtime/bus/lcm_bus.h"
-#include "runtime/clock/manual_clock.h"
-#include "sim/output/log_output.h"
-#include "sim/simulation.h"
+#include <algorithm>
+
+#include "tests/support/flown_service.h"
 
 namespace airworthy::unbalance {
 namespace {
@@ -25,15 +22,12 @@ UnbalanceConfig hexa_config() {
   return *config;
 }
 
-/// A simulated hexarotor on an in-process bus, and the service listening.
-class UnbalanceServiceTest : public ::testing::Test {
+/// A simulated hexarotor and its service.
+class UnbalanceServiceTest : public ::testing::Test,
+                             protected test::FlownService<UnbalanceService, UnbalanceConfig> {
  protected:
-  UnbalanceServiceTest() {
-    observer_.subscribe<fault_event_t>(channel::kFaultEvent,
-                                       [this](const fault_event_t& event) { events_.push_back(event); });
-    observer_.subscribe<detector_status_t>(channel::kDetectorStatus,
-                                           [this](const detector_status_t& status) { status_ = status; });
-  }
+  UnbalanceServiceTest()
+      : FlownService{"airworthy-unbalance", hexa_config(), hexa_config().monitor.vehicle, plan(), 3} {}
 
   static sim::Scenario plan() {
     sim::Scenario scenario;
@@ -48,15 +42,6 @@ class UnbalanceServiceTest : public ::testing::Test {
     return scenario;
   }
 
-  void fly_until(double time_s) {
-    while (simulation_.time_s() < time_s) {
-      simulation_.step(output_);
-      while (*bus_->dispatch(100) > 0) {
-      }
-      clock_.advance_to(clock_.now() + Duration{2'000});
-    }
-  }
-
   [[nodiscard]] double evidence(std::size_t rotor, const std::string& name) const {
     for (const evidence_t& item : status_.components.at(rotor).evidence) {
       if (item.name == name) return item.value;
@@ -69,18 +54,6 @@ class UnbalanceServiceTest : public ::testing::Test {
     const auto& all = status_.components.at(rotor).evidence;
     return std::any_of(all.begin(), all.end(), [&](const evidence_t& item) { return item.name == name; });
   }
-
-  std::unique_ptr<rt::LcmBus> bus_{std::move(*rt::LcmBus::open("memq://"))};
-  rt::ManualClock clock_{sim::LogOutput::vehicle_time(0.0)};
-  rt::Log log_{"test", rt::LogLevel::kError};
-  UnbalanceConfig config_ = hexa_config();
-  sim::LogOutput output_{*bus_, config_.vehicle, 6, 1};
-  sim::Simulation simulation_{config_.monitor.vehicle, plan(), sim::Realism::at(sim::Level::kHard), 3};
-  rt::Node observer_{*bus_, clock_, log_, {config_.vehicle, "observer", 4}};
-  rt::Node node_{*bus_, clock_, log_, {config_.vehicle, "airworthy-unbalance", 5}};
-  UnbalanceService service_{node_, config_};
-  std::vector<fault_event_t> events_;
-  detector_status_t status_;
 };
 
 TEST_F(UnbalanceServiceTest, NamesTheRotorThatLostABitOfItsPropeller) {
@@ -124,15 +97,7 @@ TEST_F(UnbalanceServiceTest, NamesTheRotorThatLostABitOfItsPropeller) {
 
 TEST_F(UnbalanceServiceTest, SilenceOfTheInertialUnitIsNotHealth) {
   fly_until(10.0);
-  rt::Node gateway{*bus_, clock_, log_, {config_.vehicle, "airworthy-gateway", 9}};
-  auto ticks = gateway.advertise(channel::kTick);
-  for (int i = 0; i < 40; ++i) {
-    clock_.advance_to(clock_.now() + Duration{50'000});
-    tick_t tick{};
-    ticks.publish(tick, sim::LogOutput::vehicle_time(10.0 + 0.05 * i));
-    while (*bus_->dispatch(100) > 0) {
-    }
-  }
+  fall_silent();
   EXPECT_EQ(status_.state, static_cast<int>(DetectorState::kMuted));
   EXPECT_EQ(status_.muted_reason, "inertial data stale");
 }
