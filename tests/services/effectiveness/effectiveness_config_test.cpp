@@ -10,6 +10,12 @@
 namespace airworthy::effectiveness {
 namespace {
 
+constexpr const char* kPolicy = "[policy]\nfalse_alarms_per_hour = 1e-4\n";
+constexpr const char* kCalibration = "calibration = \"calibration.toml\"\n";
+
+/// All that is mandatory, and these lines.
+std::string config_with(const std::string& lines) { return "vehicle = \"vehicle.toml\"\n" + lines + kPolicy; }
+
 class EffectivenessConfigTest : public ::testing::Test {
  protected:
   EffectivenessConfigTest() {
@@ -27,9 +33,7 @@ class EffectivenessConfigTest : public ::testing::Test {
     return EffectivenessConfig::load((folder_.path() / "effectiveness.toml").string(), {});
   }
 
-  [[nodiscard]] std::string vehicle_hash() const {
-    return load("vehicle = \"vehicle.toml\"\n[policy]\nfalse_alarms_per_hour = 1e-4\n")->vehicle_hash;
-  }
+  [[nodiscard]] std::string vehicle_hash() const { return load(config_with(""))->vehicle_hash; }
   // The error text with the folder taken out.
   [[nodiscard]] std::string error_of(const std::string& text) const {
     const auto config = load(text);
@@ -44,8 +48,6 @@ class EffectivenessConfigTest : public ::testing::Test {
 
   rt::TemporaryFolder folder_;
 };
-
-constexpr const char* kPolicy = "[policy]\nfalse_alarms_per_hour = 1e-4\n";
 
 Calibration learned(const std::string& vehicle_hash) {
   Calibration calibration;
@@ -89,7 +91,7 @@ TEST_F(EffectivenessConfigTest, EveryProblemIsReportedAtOnce) {
             "effectiveness.toml:4:1: input.command_latency_ms: must lie in [0, 100], is -1\n"
             "effectiveness.toml:5:1: policy.false_alarms_per_hour: missing mandatory key\n"
             "effectiveness.toml:6:1: policy.least_loss_ratio: must lie in [0.05, 0.5], is 0.9");
-  EXPECT_EQ(error_of("vehicle = \"vehicle.toml\"\n" + std::string{kPolicy} + "settle_s = 5.0\n"),
+  EXPECT_EQ(error_of(config_with("") + "settle_s = 5.0\n"),
             "effectiveness.toml:2:1: policy.settle_partial_s: 3 must not be less than settle_s (5)");
   EXPECT_EQ(error_of("vehicle = \"plane.toml\"\n" + std::string{kPolicy}),
             "effectiveness.toml:1:1: vehicle: has no table [multirotor]: there are no rotors to watch");
@@ -97,9 +99,8 @@ TEST_F(EffectivenessConfigTest, EveryProblemIsReportedAtOnce) {
 
 TEST_F(EffectivenessConfigTest, ACalibrationComesBackAsItWasWritten) {
   write("calibration.toml", to_toml(learned(vehicle_hash())));
-  const auto plain = load("vehicle = \"vehicle.toml\"\n" + std::string{kPolicy});
-  const auto config =
-      load("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n" + std::string{kPolicy});
+  const auto plain = load(config_with(""));
+  const auto config = load(config_with(kCalibration));
   ASSERT_TRUE(plain.has_value()) << plain.error().text;
   ASSERT_TRUE(config.has_value()) << config.error().text;
   EXPECT_TRUE(config->is_calibrated);
@@ -120,8 +121,7 @@ TEST_F(EffectivenessConfigTest, ACalibrationComesBackAsItWasWritten) {
 TEST_F(EffectivenessConfigTest, ACalibrationShowsTheNumberingOnlyWhereRollAndPitchWereExcited) {
   const auto is_known = [this](const std::string& calibration, const std::string& input = "") {
     write("calibration.toml", calibration);
-    const auto config =
-        load("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n" + input + kPolicy);
+    const auto config = load(config_with(kCalibration + input));
     EXPECT_TRUE(config.has_value()) << (config ? "" : config.error().text);
     return config && config->monitor.mapping_is_known;
   };
@@ -139,40 +139,35 @@ TEST_F(EffectivenessConfigTest, ACalibrationShowsTheNumberingOnlyWhereRollAndPit
 }
 
 TEST_F(EffectivenessConfigTest, TheInertialDelayIsLearnedOfAtMost1000SamplesASecond) {
-  const std::string vehicle = "vehicle = \"vehicle.toml\"\n";
   EXPECT_EQ(
-      error_of(vehicle + "[input]\nimu_rate_Hz = 2000\ninertial_delay_learned = true\n" + kPolicy),
+      error_of(config_with("[input]\nimu_rate_Hz = 2000\ninertial_delay_learned = true\n")),
       "effectiveness.toml:3:1: input.imu_rate_Hz: 2000 is more than the 1000 of which inertial_delay_learned "
       "can learn a delay");
-  EXPECT_TRUE(
-      load(vehicle + "[input]\nimu_rate_Hz = 1000\ninertial_delay_learned = true\n" + kPolicy).has_value());
-  EXPECT_TRUE(load(vehicle + "[input]\nimu_rate_Hz = 2000\n" + kPolicy).has_value());
+  EXPECT_TRUE(load(config_with("[input]\nimu_rate_Hz = 1000\ninertial_delay_learned = true\n")).has_value());
+  EXPECT_TRUE(load(config_with("[input]\nimu_rate_Hz = 2000\n")).has_value());
 }
 
 TEST_F(EffectivenessConfigTest, ACalibrationOfAnotherVehicleIsRefused) {
   Calibration other = learned(vehicle_hash());
   other.vehicle = "small";
   write("calibration.toml", to_toml(other));
-  EXPECT_EQ(
-      error_of("vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n" + std::string{kPolicy}),
-      "effectiveness.toml:2:1: calibration: is of vehicle \"small\", not of \"medium\"");
+  EXPECT_EQ(error_of(config_with(kCalibration)),
+            "effectiveness.toml:2:1: calibration: is of vehicle \"small\", not of \"medium\"");
 }
 
 TEST_F(EffectivenessConfigTest, ACalibrationWithAnotherContentOfTheVehicleFileIsRefused) {
-  const std::string config = "vehicle = \"vehicle.toml\"\ncalibration = \"calibration.toml\"\n";
   write("calibration.toml", to_toml(learned("0123456789abcdef")));
-  EXPECT_EQ(error_of(config + kPolicy),
+  EXPECT_EQ(error_of(config_with(kCalibration)),
             "effectiveness.toml:2:1: calibration: was learned with another content of the file of vehicle "
             "\"medium\": calibrate again");
 }
 
 TEST_F(EffectivenessConfigTest, NoMoreSamplesMayWaitThanTheDetectorHolds) {
-  const std::string vehicle = "vehicle = \"vehicle.toml\"\n";
   EXPECT_EQ(
-      error_of(vehicle + "[input]\nimu_rate_Hz = 4000\n" + kPolicy),
+      error_of(config_with("[input]\nimu_rate_Hz = 4000\n")),
       "effectiveness.toml:2:1: input.most_wait_ms: at imu_rate_Hz = 4000 that is 80 samples; the detector "
       "holds 60");
-  EXPECT_TRUE(load(vehicle + "[input]\nimu_rate_Hz = 4000\nmost_wait_ms = 15\n" + kPolicy).has_value());
+  EXPECT_TRUE(load(config_with("[input]\nimu_rate_Hz = 4000\nmost_wait_ms = 15\n")).has_value());
 }
 
 }  // namespace
