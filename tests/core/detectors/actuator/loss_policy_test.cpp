@@ -16,6 +16,16 @@ constexpr LossPolicyParams kParams{.loss = 0.2,
 
 TimePoint at(double s) { return TimePoint{} + from_seconds(s); }
 
+/// Its fault was raised.
+LossPolicy raised(bool latched) {
+  LossPolicyParams params = kParams;
+  params.life_cycle.latched = latched;
+  LossPolicy policy{params};
+  for (int i = 0; i < 20; ++i) (void)policy.step(0.5, 0.05, true, at(0.01 * i));
+  EXPECT_TRUE(policy.active());
+  return policy;
+}
+
 TEST(LossPolicy, ProbabilityIsThatOfTheNormalDistribution) {
   EXPECT_DOUBLE_EQ(LossPolicy::exceedance(0.2, 0.1, 0.2), 0.5);
   EXPECT_NEAR(LossPolicy::exceedance(0.3, 0.1, 0.2), 0.841345, 1e-6);  // Φ(1)
@@ -51,11 +61,7 @@ TEST(LossPolicy, RaisesNothingThatItMayNotAndNothingUncertain) {
 
 TEST(LossPolicy, ClearsWithHysteresisUnlessLatched) {
   for (const bool latched : {false, true}) {
-    LossPolicyParams params = kParams;
-    params.life_cycle.latched = latched;
-    LossPolicy policy{params};
-    for (int i = 0; i < 20; ++i) (void)policy.step(0.5, 0.05, true, at(0.01 * i));
-    ASSERT_TRUE(policy.active());
+    LossPolicy policy = raised(latched);
     bool cleared = false;
     for (int i = 0; i < 300; ++i) {
       // Φ(0.2) is above 0.5 · 0.95 for the first second, Φ(−2) below.
@@ -70,11 +76,7 @@ TEST(LossPolicy, ClearsWithHysteresisUnlessLatched) {
 
 TEST(LossPolicy, RearmedItRaisesALatchedFaultAgainAndKeepsOneThatCanClear) {
   for (const bool latched : {false, true}) {
-    LossPolicyParams params = kParams;
-    params.life_cycle.latched = latched;
-    LossPolicy policy{params};
-    for (int i = 0; i < 20; ++i) (void)policy.step(0.5, 0.05, true, at(0.01 * i));
-    ASSERT_TRUE(policy.active());
+    LossPolicy policy = raised(latched);
     policy.pause(at(10.0));
     policy.rearm();
     EXPECT_EQ(policy.active(), !latched);
