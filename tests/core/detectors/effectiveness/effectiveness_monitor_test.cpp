@@ -119,6 +119,18 @@ class Hover : public test::HoveringQuad {
   double time_s_ = 0.0;
 };
 
+/// Takes all its thrust from a rotor, counted from 0, which must be named within `seconds`. Returns the delay.
+Duration lose_propeller(Hover& hover, std::size_t rotor, double seconds) {
+  EXPECT_FALSE(hover.event) << "before the loss";
+  hover.effectiveness[rotor] = 0.0;
+  const TimePoint onset = hover.now();
+  hover.fly(seconds);
+  EXPECT_TRUE(hover.event);
+  if (!hover.event) return Duration::max();
+  EXPECT_EQ(hover.event->rotor, rotor);
+  return hover.event->decided - onset;
+}
+
 TEST(EffectivenessMonitor, FindsEachRotorAndLatches) {
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     Hover hover;
@@ -344,12 +356,7 @@ TEST(EffectivenessMonitor, FindsALossInSeldomSamples) {
     hover.fly(8.0);
     ASSERT_FALSE(hover.event);
     ASSERT_EQ(hover.monitor.muted(), Muted::kNot) << step_s;
-    hover.effectiveness[3] = 0.0;
-    const TimePoint onset = hover.now();
-    hover.fly(0.5);
-    ASSERT_TRUE(hover.event) << step_s;
-    EXPECT_EQ(hover.event->rotor, 3U);
-    EXPECT_LT(hover.event->decided - onset, Duration{60'000}) << step_s;
+    EXPECT_LT(lose_propeller(hover, 3, 0.5), Duration{60'000}) << step_s;
   }
 }
 
@@ -435,16 +442,14 @@ TEST(EffectivenessMonitor, RefusesWhatIsNoNumberAndTimesThatGoBack) {
 
 TEST(EffectivenessMonitor, AClockThatJumpsForwardBlamesNobody) {
   for (const double seconds : {0.3, 5.0, 3600.0}) {
+    SCOPED_TRACE(seconds);
     Hover hover;
     hover.fly(10.0);
     hover.jump(seconds);
     hover.fly(10.0);
     EXPECT_FALSE(hover.event) << seconds;
     EXPECT_EQ(hover.monitor.muted(), Muted::kNot) << seconds;
-    hover.effectiveness[1] = 0.0;
-    hover.fly(0.2);
-    ASSERT_TRUE(hover.event) << seconds;
-    EXPECT_EQ(hover.event->rotor, 1U) << seconds;
+    lose_propeller(hover, 1, 0.2);
   }
 }
 
@@ -489,10 +494,7 @@ TEST(EffectivenessMonitor, AnInertialUnitThatRepeatsItselfIsNoMeasurement) {
     hover.fly(5.0);
     EXPECT_FALSE(hover.event) << "rotor " << hover.event->rotor + 1;
     EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
-    hover.effectiveness[1] = 0.0;
-    hover.fly(0.2);
-    ASSERT_TRUE(hover.event);
-    EXPECT_EQ(hover.event->rotor, 1U);
+    lose_propeller(hover, 1, 0.2);
   }
 }
 
@@ -503,16 +505,12 @@ TEST(EffectivenessMonitor, HeldSamplesDoNotHinder) {
   hover.fly(5.0);
   EXPECT_FALSE(hover.event);
   EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
-  hover.effectiveness[3] = 0.0;
-  const TimePoint onset = hover.now();
-  hover.fly(0.2);
-  ASSERT_TRUE(hover.event);
-  EXPECT_EQ(hover.event->rotor, 3U);
-  EXPECT_LT(hover.event->decided - onset, Duration{25'000});
+  EXPECT_LT(lose_propeller(hover, 3, 0.2), Duration{25'000});
 }
 
 TEST(EffectivenessMonitor, WhatNoSensorMeasuresIsRefusedAndForgotten) {
   for (const double value : {201.0, 1e200, -1e200}) {
+    SCOPED_TRACE(value);
     Hover hover;
     hover.fly(5.0);
     hover.jump(kStep_s);
@@ -524,10 +522,7 @@ TEST(EffectivenessMonitor, WhatNoSensorMeasuresIsRefusedAndForgotten) {
     EXPECT_FALSE(hover.event);
     EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
     EXPECT_NEAR(hover.monitor.gyro_sigma(0), 0.02, 0.01);
-    hover.effectiveness[1] = 0.0;
-    hover.fly(0.2);
-    ASSERT_TRUE(hover.event) << value;
-    EXPECT_EQ(hover.event->rotor, 1U);
+    lose_propeller(hover, 1, 0.2);
   }
 }
 
@@ -543,10 +538,7 @@ TEST(EffectivenessMonitor, OneStampOfTheFutureIsForgotten) {
   EXPECT_EQ(hover.monitor.newest_sample(), hover.now());
   EXPECT_GT(hover.monitor.newest_sample(), before);
   EXPECT_EQ(hover.monitor.muted(), Muted::kNot);
-  hover.effectiveness[2] = 0.0;
-  hover.fly(0.2);
-  ASSERT_TRUE(hover.event);
-  EXPECT_EQ(hover.event->rotor, 2U);
+  lose_propeller(hover, 2, 0.2);
 }
 
 // Stamped when it was measured, telemetry may be on its way for longer than its interval: no rotor is silent for that.
@@ -557,12 +549,7 @@ TEST(EffectivenessMonitor, LateReportsAreNoSilence) {
     hover.sends_commands = true;
     hover.fly(5.0);
     ASSERT_FALSE(hover.event) << late_ms;
-    hover.effectiveness[1] = 0.0;
-    const TimePoint onset = hover.now();
-    hover.fly(0.3);
-    ASSERT_TRUE(hover.event) << late_ms;
-    EXPECT_EQ(hover.event->rotor, 1U);
-    EXPECT_LT(hover.event->decided - onset, Duration{25'000}) << late_ms;
+    EXPECT_LT(lose_propeller(hover, 1, 0.3), Duration{25'000}) << late_ms;
   }
 }
 
@@ -586,12 +573,7 @@ TEST(EffectivenessMonitor, AnAccelerometerBesideTheCentreOfMassFeelsNoPush) {
   described.vehicle.imu_position_m = {0.0, 0.0, -0.08};
   Hover hover{described};
   hover.fly(5.0);
-  hover.effectiveness[1] = 0.0;
-  const TimePoint onset = hover.now();
-  hover.fly(0.3);
-  ASSERT_TRUE(hover.event);
-  EXPECT_EQ(hover.event->rotor, 1U);
-  EXPECT_LT(hover.event->decided - onset, Duration{25'000});
+  EXPECT_LT(lose_propeller(hover, 1, 0.3), Duration{25'000});
 }
 
 TEST(EffectivenessMonitor, UsesNoHeap) {
