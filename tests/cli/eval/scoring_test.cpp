@@ -15,25 +15,32 @@ Alarm alarm(double time_s, const std::string& component = "engine", const std::s
   return {at(time_s), at(time_s), component, kind, 0.0, {}};
 }
 
-void add_fault(Flight& flight, const std::string& component, const std::string& kind, double onset_s,
-               std::optional<double> end_s = std::nullopt) {
+Truth fault(const std::string& component, const std::string& kind, double onset_s,
+            std::optional<double> end_s = std::nullopt) {
   Truth fault{component, kind, at(onset_s), std::nullopt};
   if (end_s) fault.end = at(*end_s);
-  if (!flight.truth || !flight.truth->onset) flight.truth = fault;
-  flight.faults.push_back(fault);
+  return fault;
 }
 
-/// Judged from begin to end.
-Flight flight(std::optional<double> onset_s, std::vector<double> alarms_s, double duration_s = 120) {
+/// Of 120 s, judged from begin to end.
+Flight flight_of(const std::vector<Truth>& faults, const std::vector<Alarm>& alarms) {
   Flight flight;
   flight.name = "f";
-  flight.truth = Truth{"", "none", std::nullopt, std::nullopt};
-  if (onset_s) add_fault(flight, "engine", "thrust_loss", *onset_s);
+  flight.truth = faults.empty() ? Truth{"", "none", std::nullopt, std::nullopt} : faults.front();
+  flight.faults = faults;
   flight.start = at(0);
-  flight.end = at(duration_s);
-  for (const double t : alarms_s) flight.alarms.push_back(alarm(t));
+  flight.end = at(120);
+  flight.alarms = alarms;
   flight.judgement.note(flight.start, flight.end, "");
   return flight;
+}
+
+Flight flight(std::optional<double> onset_s, const std::vector<double>& alarms_s) {
+  std::vector<Truth> faults;
+  if (onset_s) faults.push_back(fault("engine", "thrust_loss", *onset_s));
+  std::vector<Alarm> alarms;
+  for (const double t : alarms_s) alarms.push_back(alarm(t));
+  return flight_of(faults, alarms);
 }
 
 Rules of(const std::string& detector) { return {.detector = detector, .warm_up = Duration{0}}; }
@@ -82,9 +89,9 @@ TEST(Score, WithoutTruthNothingIsScored) {
 }
 
 TEST(Score, FoundSaysWhetherTheFailedPartIsNamed) {
-  Flight one = flight(60, {});
-  one.alarms = {alarm(61, "pitch control", "control_effectiveness_loss"), alarm(65)};
-  const Score other = score(one, {});
+  const Score other = score(flight_of({fault("engine", "thrust_loss", 60)},
+                                      {alarm(61, "pitch control", "control_effectiveness_loss"), alarm(65)}),
+                            {});
   EXPECT_EQ(other.outcome, Outcome::kTruePositive);
   EXPECT_EQ(other.named, Named::kAnother);
   EXPECT_NEAR(other.delay_s, 1.0, 1e-6);
@@ -94,57 +101,49 @@ TEST(Score, FoundSaysWhetherTheFailedPartIsNamed) {
 }
 
 TEST(Score, ARotorBlamedForAFrozenGyroIsAFalseAlarm) {
-  Flight one = flight(std::nullopt, {});
-  add_fault(one, "imu", "gyro_freeze", 30);
-  EXPECT_EQ(score(one, of("effectiveness")).outcome, Outcome::kTrueNegative);
-  one.alarms = {alarm(30.08, "rotor 3", "partial_loss")};
-  const Score blamed = score(one, of("effectiveness"));
+  const Truth frozen = fault("imu", "gyro_freeze", 30);
+  EXPECT_EQ(score(flight_of({frozen}, {}), of("effectiveness")).outcome, Outcome::kTrueNegative);
+  const Score blamed =
+      score(flight_of({frozen}, {alarm(30.08, "rotor 3", "partial_loss")}), of("effectiveness"));
   EXPECT_EQ(blamed.outcome, Outcome::kFalsePositive);
   EXPECT_EQ(blamed.false_alarms, 1);
   EXPECT_NEAR(blamed.healthy_s, 120, 1e-6);
 }
 
 TEST(Score, OfSeveralFaultsThoseThatTheDetectorWatchesCount) {
-  Flight one = flight(std::nullopt, {});
-  add_fault(one, "rotor 2", "unbalance", 10);
-  add_fault(one, "rotor 3", "propeller_lost", 60);
-  one.alarms = {alarm(61, "rotor 3", "propeller_lost")};
-  const Score right = score(one, of("effectiveness"));
+  const std::vector faults{fault("rotor 2", "unbalance", 10), fault("rotor 3", "propeller_lost", 60)};
+  const Score right = score(flight_of(faults, {alarm(61, "rotor 3", "propeller_lost")}), of("effectiveness"));
   EXPECT_EQ(right.outcome, Outcome::kTruePositive);
   EXPECT_EQ(right.named, Named::kRight);
   EXPECT_NEAR(right.delay_s, 1.0, 1e-6);
   EXPECT_NEAR(right.healthy_s, 60, 1e-6);
-  one.alarms = {alarm(30, "rotor 2", "partial_loss")};
-  EXPECT_EQ(score(one, of("effectiveness")).outcome, Outcome::kEarly);
-  one.alarms = {alarm(30, "rotor 2", "unbalance")};
-  EXPECT_EQ(score(one, of("unbalance")).outcome, Outcome::kTruePositive);
+  EXPECT_EQ(score(flight_of(faults, {alarm(30, "rotor 2", "partial_loss")}), of("effectiveness")).outcome,
+            Outcome::kEarly);
+  EXPECT_EQ(score(flight_of(faults, {alarm(30, "rotor 2", "unbalance")}), of("unbalance")).outcome,
+            Outcome::kTruePositive);
 }
 
 TEST(Score, TheDelayIsFromTheFaultThatIsNamed) {
-  Flight one = flight(std::nullopt, {});
-  add_fault(one, "rotor 1", "partial_loss", 20);
-  add_fault(one, "rotor 2", "partial_loss", 60);
-  one.alarms = {alarm(61, "rotor 2", "partial_loss")};
-  const Score second = score(one, of("effectiveness"));
+  const std::vector faults{fault("rotor 1", "partial_loss", 20), fault("rotor 2", "partial_loss", 60)};
+  const Score second = score(flight_of(faults, {alarm(61, "rotor 2", "partial_loss")}), of("effectiveness"));
   EXPECT_EQ(second.named, Named::kRight);
   EXPECT_NEAR(second.delay_s, 1.0, 1e-6);
   EXPECT_FALSE(second.faults[0].named_s);
   EXPECT_TRUE(second.faults[1].named_s);
-  one.alarms = {alarm(61, "rotor 4", "partial_loss")};
-  EXPECT_EQ(score(one, of("effectiveness")).named, Named::kAnother);
-  EXPECT_NEAR(score(one, of("effectiveness")).delay_s, 41.0, 1e-6);
+  const Score neither = score(flight_of(faults, {alarm(61, "rotor 4", "partial_loss")}), of("effectiveness"));
+  EXPECT_EQ(neither.named, Named::kAnother);
+  EXPECT_NEAR(neither.delay_s, 41.0, 1e-6);
 }
 
 TEST(Score, AfterTheEndOfAFaultTheFlightIsHealthyAgain) {
-  Flight one = flight(std::nullopt, {});
-  add_fault(one, "left elevon", "loss_of_effectiveness", 30, 40);
-  add_fault(one, "right elevon", "loss_of_effectiveness", 80, 90);
-  EXPECT_NEAR(score(one, {}).healthy_s, 10 + 30 + 20, 1e-6) << "20 to 30, 50 to 80, 100 to 120";
-  one.alarms = {alarm(49, "roll control")};
-  EXPECT_EQ(score(one, {}).outcome, Outcome::kTruePositive);
-  one.alarms = {alarm(60, "roll control")};
-  EXPECT_EQ(score(one, {}).outcome, Outcome::kEarly);
-  EXPECT_EQ(score(one, {}).false_alarms, 1);
+  const std::vector faults{fault("left elevon", "loss_of_effectiveness", 30, 40),
+                           fault("right elevon", "loss_of_effectiveness", 80, 90)};
+  EXPECT_NEAR(score(flight_of(faults, {}), {}).healthy_s, 10 + 30 + 20, 1e-6)
+      << "20 to 30, 50 to 80, 100 to 120";
+  EXPECT_EQ(score(flight_of(faults, {alarm(49, "roll control")}), {}).outcome, Outcome::kTruePositive);
+  const Score early = score(flight_of(faults, {alarm(60, "roll control")}), {});
+  EXPECT_EQ(early.outcome, Outcome::kEarly);
+  EXPECT_EQ(early.false_alarms, 1);
 }
 
 TEST(Score, AFaultAfterTheEndOfTheLogIsNotMissed) {
