@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <span>
 #include <string_view>
 
@@ -143,12 +145,23 @@ struct DetectorSteps {
   std::array<double, N> speed{};
   std::int64_t taken = 0;
 
+  /// From where on every sample is judged.
+  DetectorSteps() {
+    while (to_seconds(Duration{2000 * taken}) < 4.0) step();
+  }
+
   double step() {
     const TimePoint time = from_us(2000 * ++taken);
     speed.fill(taken % 2 == 0 ? kHover_rad_s : kHover_rad_s + 0.5);
     static_cast<void>(monitor.on_speeds(time, speed));
-    const double noise = taken % 3 == 0 ? 0.01 : -0.005;
-    static_cast<void>(monitor.on_imu(time, {0.0, 0.0, -9.8}, {noise, noise, 0.0}, Phase::kInFlight));
+    constexpr std::array kNoise{0.01, -0.004, -0.006};  // never the same twice: that would be no measurement
+    const double noise = kNoise[static_cast<std::size_t>(taken % 3)];
+    const double judged_s = monitor.judged_s();
+    static_cast<void>(monitor.on_imu(time, {0.0, 0.0, noise - 9.8}, {noise, noise, 0.0}, Phase::kInFlight));
+    if (taken >= 2000 && !(monitor.judged_s() > judged_s)) {
+      std::fputs("detector_sample: a sample was not judged\n", stderr);
+      std::abort();
+    }
     return monitor.judged_s();
   }
 };
