@@ -16,6 +16,7 @@
 #include "cli/eval/flight_run.h"
 #include "cli/eval/nested.h"
 #include "cli/eval/report.h"
+#include "runtime/process/command_line.h"
 #include "runtime/process/exit.h"
 
 namespace {
@@ -172,6 +173,7 @@ int run(int argc, char** argv) {
       "Runs a configured detector over recorded flights, on message time, and scores it against the truth in "
       "the logs.",
       "airworthy eval"};
+  app.set_version_flag("--version", "airworthy-eval " AIRWORTHY_VERSION);
   app.footer(kRules);
   Options options;
   options.learning.jobs = std::max(1U, std::thread::hardware_concurrency());
@@ -199,19 +201,16 @@ int run(int argc, char** argv) {
       ->needs(nested_flag);
   app.add_option("--false-alarms-per-hour", options.learning.false_alarms_per_hour,
                  "--nested: of each channel; default 0.01")
-      ->check(CLI::Range(1e-6, 10.0))
+      ->check(rt::is_number(rt::Range{1e-6, 10.0}))
       ->needs(nested_flag);
   app.add_flag(
       "--muted", options.muted,
       "also print how long each flight was judged and which seconds were not, by cause, and how long each "
       "component; to half a second, effectiveness to a sample; with --json it is always there");
   app.add_flag("--json", options.json, "print JSON instead of a table");
-  app.add_option("--jobs", options.learning.jobs, "flights evaluated at a time")->check(CLI::Range(1U, 256U));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EX_OK : EX_USAGE;
-  }
+  app.add_option("--jobs", options.learning.jobs, "flights evaluated at a time")
+      ->check(rt::is_whole_number(1, 256));
+  if (const auto ended = rt::parse_command_line(app, argc, argv)) return *ended;
   return evaluate(options);
 }
 

@@ -86,6 +86,14 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(self.first_line("calibrate", *what, "x.lcm", "--jobs", "0", "--config", "c", "-o", "o"),
                              "--jobs: must be a whole number in [1, 256], is 0")
 
+    def test_eval_takes_numbers_that_mean_something(self):
+        given = ("eval", "x.lcm", "--config", CONFIG / "response.toml", "--nested")
+        for text in ("nan", "inf", "0", "11", "few"):
+            self.assertEqual(self.first_line(*given, "--false-alarms-per-hour", text),
+                             f"--false-alarms-per-hour: must lie in [1e-06, 10], is {text}")
+        for text in ("0", "257", "07", "1.5"):
+            self.assertEqual(self.first_line(*given, "--jobs", text), f"--jobs: must be a whole number in [1, 256], is {text}")
+
     def test_calibrate_replaces_nothing_but_a_file(self):
         target = self.folder / "target"
         target.write_text("old")
@@ -97,14 +105,14 @@ class CommandLine(unittest.TestCase):
         self.assertTrue(link.is_symlink())
 
     def test_every_command_tells_its_version(self):
-        for name in ("sim", "calibrate", "import", "watch", "doctor"):
+        for name in ("sim", "calibrate", "import", "watch", "doctor", "eval"):
             self.assertRegex(self.run_it(name, "--version", code=0), r"\d+\.\d+\.\d+")
         for what in ("unbalance", "effectiveness", "response"):
             self.assertRegex(self.run_it("calibrate", what, "--version", code=0), r"\d+\.\d+\.\d+")
 
     def test_an_unknown_option_is_told_with_the_name_of_the_program(self):
-        for name in ("watch", "doctor"):
-            self.assertEqual(self.first_line(name, "--colour"), "The following argument was not expected: --colour")
+        for name in ("watch", "doctor", "eval"):
+            self.assertEqual(self.first_line(name, *["x.lcm", "--config", "c"] * (name == "eval"), "--colour"), "The following argument was not expected: --colour")
 
 
 if __name__ == "__main__":
