@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "core/estimators/inertial_range.h"
 #include "core/protocol/mavlink/constants.h"
 
 namespace airworthy::drivers {
@@ -15,8 +16,6 @@ constexpr double kMilliG_m_s2 = 9.80665e-3;
 constexpr double kRadians = std::numbers::pi / 180.0;
 
 // Beyond what any part of a drone can show: a wrong unit or a damaged sensor, not a measurement.
-constexpr double kMostAccel_m_s2 = 2000.0;
-constexpr double kMostRate_rad_s = 200.0;
 constexpr double kLeastTemperature_degC = -60.0;
 constexpr double kMostTemperature_degC = 250.0;
 constexpr double kMostSpeed_rpm = 200'000.0;

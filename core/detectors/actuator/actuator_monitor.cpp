@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/estimators/inertial_range.h"
 #include "core/math/triangular.h"
 
 namespace airworthy::actuator {
@@ -13,10 +14,8 @@ constexpr double kGravity_m_s2 = 9.81;
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 constexpr double kLongestStep_s = 0.1;      // a longer gap starts the flight's estimates anew
 constexpr Duration kLongestRepeat{50'000};  // then the autopilot may have been misled as well
-constexpr double kMostRate_rad_s = 200.0;   // no gyro and no accelerometer gives more
-constexpr double kMostAccel_m_s2 = 2000.0;
-constexpr double kRawAccelFactor = 4.0;  // noise before the low-pass over that after it
-constexpr double kForceReach = 2.0;      // of weight and thrust: a thrust may come and go within one sample
+constexpr double kRawAccelFactor = 4.0;     // noise before the low-pass over that after it
+constexpr double kForceReach = 2.0;  // of weight and thrust: a thrust may come and go within one sample
 constexpr Duration kSilent{500'000};
 constexpr Duration kRepaired{3'000'000};  // on the ground
 constexpr Duration kConsequence{2'000'000};
@@ -46,18 +45,6 @@ constexpr double kLeast_variance = 1e-12;  // keeps a covariance positive where 
 double square(double x) { return x * x; }
 
 bool is_loss(double gamma) { return gamma >= kLeastLoss && gamma <= kMostLoss; }
-
-UpdateStatus plausibility(const MonitorSample& sample) {
-  bool is_in_range = true;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double accel_m_s2 = sample.accel_m_s2[i];
-    const double rate_rad_s = sample.gyro_rad_s[i];
-    if (!std::isfinite(accel_m_s2) || !std::isfinite(rate_rad_s)) return UpdateStatus::kNotFinite;
-    is_in_range =
-        is_in_range && std::abs(accel_m_s2) <= kMostAccel_m_s2 && std::abs(rate_rad_s) <= kMostRate_rad_s;
-  }
-  return is_in_range ? UpdateStatus::kFused : UpdateStatus::kOutOfRange;
-}
 
 }  // namespace
 
@@ -215,7 +202,8 @@ void ActuatorMonitor::check_sensors(const MonitorSample& sample) noexcept {
 }
 
 UpdateStatus ActuatorMonitor::on_imu(const MonitorSample& sample, Phase phase) noexcept {
-  if (const UpdateStatus status = plausibility(sample); status != UpdateStatus::kFused) {
+  if (const UpdateStatus status = inertial_status(sample.accel_m_s2, sample.gyro_rad_s);
+      status != UpdateStatus::kFused) {
     ++refused_;
     return status;
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/estimators/inertial_range.h"
+
 namespace airworthy::effectiveness {
 namespace {
 
@@ -19,8 +21,6 @@ constexpr double kVarianceTime_s = 2.0;
 constexpr double kLeastVarianceRatio = 0.1;  // of the first guess
 constexpr double kMostVarianceRatio = 1000.0;
 constexpr double kMeanTime_s = 0.5;
-constexpr double kMostRate_rad_s = 200.0;      // that a gyroscope measures ...
-constexpr double kMostForce_m_s2 = 2000.0;     // ... and an accelerometer: more is damage on the way
 constexpr double kMostLateness_s = 0.25;       // a rotor whose reports are later is a silent one
 constexpr double kLatenessShare = 0.05;        // of the newest report in the mean
 constexpr double kMostExtrapolated_s = 0.008;  // beyond the newest report, without commands
@@ -73,14 +73,6 @@ SlowEvidenceParams slow_params_of(const EffectivenessParams& params) {
   result.gain_ratio = params.noise.gain_error_ratio;
   result.least_excess_ratio = params.least_loss_ratio;
   return result;
-}
-
-bool is_measurable(const std::array<double, 3>& accel_m_s2, const std::array<double, 3>& gyro_rad_s) {
-  for (std::size_t i = 0; i < 3; ++i) {  // not for what is no number either
-    if (!(std::abs(gyro_rad_s[i]) <= kMostRate_rad_s && std::abs(accel_m_s2[i]) <= kMostForce_m_s2))
-      return false;
-  }
-  return true;
 }
 
 }  // namespace
@@ -147,7 +139,7 @@ double EffectivenessMonitor::accel_sigma() const noexcept { return std::sqrt(acc
 std::optional<LossEvent> EffectivenessMonitor::on_imu(TimePoint time, const std::array<double, 3>& accel_m_s2,
                                                       const std::array<double, 3>& gyro_rad_s,
                                                       Phase phase) noexcept {
-  if (!is_measurable(accel_m_s2, gyro_rad_s)) {
+  if (inertial_status(accel_m_s2, gyro_rad_s) != UpdateStatus::kFused) {
     ++dropped_;
     return std::nullopt;
   }

@@ -14,7 +14,7 @@ constexpr double kLongestStep_s = 0.03;  // a longer gap interrupts
 constexpr double kLook_s = 1.0;
 constexpr Duration kDoubtful{
     1'000'000};  // after a speed that was refused: where one is wrong, others are too
-constexpr double kMostRate_rad_s =
+constexpr double kTumbling_rad_s =
     3.0;  // where the body tumbles, inertia and air that nobody described decide
 constexpr double kMostTelemetryInterval_s = 0.025;  // between two, speeds are taken as straight lines
 constexpr double kMostGap_s =
@@ -157,7 +157,7 @@ std::optional<SlowEvidence::Excess> SlowEvidence::process(const SlowSample& samp
   last_ = sample.time;
   const bool goes_on = is_running_ && !starts_over_ && dt_s <= kLongestStep_s;
   const auto& w = sample.gyro_rad_s;
-  if (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] > kMostRate_rad_s * kMostRate_rad_s)
+  if (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] > kTumbling_rad_s * kTumbling_rad_s)
     doubtful_until_ = sample.time + kDoubtful;
   const bool is_doubtful = doubtful_until_ && sample.time < *doubtful_until_;
   is_running_ = sample.is_judged && !is_doubtful && is_reported_often(sample.time);
