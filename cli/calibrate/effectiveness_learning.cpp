@@ -14,6 +14,7 @@
 #include "cli/calibrate/learning.h"
 #include "cli/eval/flight_run.h"
 #include "core/estimators/effectiveness/control_regression.h"
+#include "core/vehicle/gravity.h"
 #include "runtime/bus/channels.h"
 #include "runtime/phase/flight_phase_input.h"
 
@@ -49,7 +50,6 @@ constexpr double kMostStep_s = 0.05;              // ... of seldom samples
 constexpr double kLeastExplained = 0.1;
 constexpr double kAsMuch = 0.9;
 constexpr double kMostRelativeError = 0.15;
-constexpr double kGravity_m_s2 = 9.81;
 
 std::array<double, kMaxRotors> values_of(const std::vector<double>& from, double scale) {
   std::array<double, kMaxRotors> to{};

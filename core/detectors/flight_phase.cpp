@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/vehicle/gravity.h"
+
 namespace airworthy {
 namespace {
 
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kLongestStep_s = 0.1;    // a longer gap is no time to integrate over
 constexpr double kHistoryStep_s = 0.005;  // 16 of them: 80 ms
 constexpr std::size_t kBehind = 5;        // steps: 25 ms

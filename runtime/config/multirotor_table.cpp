@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/vehicle/gravity.h"
+
 namespace airworthy::rt {
 namespace {
 
@@ -64,7 +66,6 @@ void check_places(ConfigTable table, const Multirotor& vehicle) {
 
 /// Hovering, the rotors turn at a speed that the motors have.
 void check_hover(ConfigTable table, const Multirotor& vehicle) {
-  constexpr double kGravity_m_s2 = 9.81;
   double lifting_rotors = 0.0;  // each by its share upward
   for (const Rotor& rotor : vehicle.rotors()) lifting_rotors -= rotor.thrust_axis[2];
   const double weight_N = vehicle.mass_kg * kGravity_m_s2;

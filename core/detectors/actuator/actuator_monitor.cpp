@@ -6,11 +6,11 @@
 
 #include "core/estimators/inertial_range.h"
 #include "core/math/triangular.h"
+#include "core/vehicle/gravity.h"
 
 namespace airworthy::actuator {
 namespace {
 
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 constexpr double kLongestStep_s = 0.1;      // a longer gap starts the flight's estimates anew
 constexpr Duration kLongestRepeat{50'000};  // then the autopilot may have been misled as well

@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "core/estimators/inertial_range.h"
+#include "core/vehicle/gravity.h"
 
 namespace airworthy::effectiveness {
 namespace {
 
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kLongestStep_s = 0.03;  // a longer gap starts the prediction over ...
 constexpr double kGapSteps = 3.0;        // ... where samples come seldom, one of so many steps ...
 constexpr double kMostStep_s = 0.05;     // ... as long as the filters of the axes are valid

@@ -5,11 +5,11 @@
 
 #include "core/detectors/effectiveness/rotor_loss_test.h"
 #include "core/estimators/effectiveness/loss_of_effectiveness_filter.h"
+#include "core/vehicle/gravity.h"
 
 namespace airworthy::effectiveness {
 namespace {
 
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kLongestStep_s = 0.03;  // a longer gap interrupts
 constexpr double kLook_s = 1.0;
 constexpr Duration kDoubtful{

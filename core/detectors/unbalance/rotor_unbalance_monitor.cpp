@@ -8,13 +8,13 @@
 
 #include "core/detectors/unbalance/rigid_body_response.h"
 #include "core/detectors/unbalance/rotors_together.h"
+#include "core/vehicle/gravity.h"
 
 namespace airworthy {
 namespace {
 
 using Transition = FaultLifeCycle::Transition;
 
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kConverging_s = 0.5;
 constexpr double kSmoothing_s = 0.5;
 constexpr double kSigmas = 2.0;
